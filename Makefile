@@ -1,0 +1,42 @@
+# The contract: people and CI call these targets only.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+WORKERS ?= 2
+
+.DEFAULT_GOAL := help
+.PHONY: help setup eval paper test lint bench clean
+
+help:  ## list the targets
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
+
+$(VENV)/.ready: pyproject.toml constraints.txt build_proto.py $(wildcard proto/*.proto)
+	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || { rm -rf $(VENV); \
+	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	    echo "installing the system package python3-venv"; apt-get update -qq && apt-get install -y -qq python3-venv >/dev/null; \
+	    $(PYTHON) -m venv $(VENV); \
+	  else echo "cannot create a virtual environment: install the system package python3-venv (Debian, Ubuntu)" >&2; exit 2; fi; }
+	@echo "installing hippodrome and its packages into $(VENV) (a minute or two)"
+	@$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
+	@$(BIN)/python -m hippodrome.sim.render.probe --install
+	@touch $@
+
+setup: $(VENV)/.ready  ## install everything into .venv (the other targets do this themselves)
+
+eval: setup  ## build, refine, localize and score maps of several generated towns, in out/eval
+	@$(BIN)/hippodrome eval scenarios/towns/*.yaml --workers $(WORKERS) --out out/eval
+
+paper: setup  ## the paper's drive: 1,315 s, 14,717 frames, about 7.2 km
+	@$(BIN)/hippodrome eval scenarios/paper.yaml --workers $(WORKERS) --out out/paper
+
+test: setup  ## the whole test suite, on real SUMO and real GL
+	@$(BIN)/python -m pytest tests
+
+lint: setup  ## ruff and strict mypy
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy
+
+bench: setup  ## speed and memory, as ratios measured in one run
+	@$(BIN)/python -m benchmarks
+
+clean:  ## remove results, keep the environment
+	@rm -rf out

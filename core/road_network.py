@@ -11,7 +11,10 @@ from hippodrome.core.types import FloatArray, IntArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoadNetwork:
-    """L lanes, those inside junctions included. Lane ``i`` owns ``points_m[point_start[i]:point_start[i + 1]]`` (at least 2 points)."""
+    """L lanes, those inside junctions included.
+
+    Lane ``i`` owns ``points_m[point_start[i]:point_start[i + 1]]``, at least 2 points.
+    """
 
     lane_ids: tuple[str, ...]
     edge_ids: tuple[str, ...]

@@ -1,8 +1,8 @@
 """The objects that travel through hippodrome.
 
 Frames of reference. *Body*: rear axle of the vehicle, x forward, y left, heading counter-clockwise from x.
-*Network*: the road network's metric frame (SUMO coordinates, x east, y north). *Semi-metric*: the mapper's own frame, which
-begins at the first vertex and is measured in map units: one unit is an unknown, slowly varying number of metres (monocular scale).
+*Network*: the road network's metric frame (SUMO coordinates, x east, y north). *Semi-metric*: the mapper's own frame; it begins
+at the first vertex and is measured in map units: one unit is an unknown, slowly varying number of metres (monocular scale).
 A pose is ``(x, y, heading_rad)``. Arrays named ``*_m`` are metres in the network frame; poses without a unit are in map units.
 """
 

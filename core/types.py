@@ -177,3 +177,22 @@ class LocalizationEstimate:
     head_reliability: FloatArray  # (2,) 1/rad^2
     grid_phase_rad: FloatArray  # (M, 2 populations, 2 axes)
     grid_reliability: FloatArray  # (M, 2 populations, 2 axes) 1/rad^2
+
+
+@dataclass(frozen=True, slots=True)
+class MatchBreak:
+    """A stretch of vertices that the road match could not vouch for, and why. Never silent, never guessed."""
+
+    first_vertex: int
+    last_vertex: int  # inclusive
+    status: MatchStatus
+    cause: str
+
+
+@dataclass(frozen=True, slots=True)
+class Refinement:
+    """A semi-metric map turned topometric, with everything a user needs in order to trust it."""
+
+    cognitive_map: CognitiveMap  # frame "network"
+    breaks: tuple[MatchBreak, ...]
+    estimates: dict[str, float]  # parameters estimated from the data, units in the names: sigma_z_m, beta_m, ...

@@ -1,0 +1,252 @@
+"""SUMO road networks: read into ``core``'s plain arrays, and checked before anything drives on them."""
+
+from __future__ import annotations
+
+import gzip
+import math
+import zlib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+from xml.sax import SAXException
+
+import numpy as np
+import sumolib
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.types import FloatArray, HippodromeError, IntArray
+
+SumoNet: TypeAlias = Any  # sumolib.net.Net: sumolib has no types
+SumoLane: TypeAlias = Any
+
+MIN_LANE_M: Final = 0.01  # SUMO writes coordinates in centimetres; a shorter lane is a point
+COINCIDENT_M: Final = 1.0  # nodes closer than this are one crossing to a driver
+
+
+def read_network(net_file: Path) -> RoadNetwork:
+    """The lanes of a SUMO network (``.net.xml`` or ``.net.xml.gz``) that passenger cars may use."""
+    return road_network(load_net(net_file), net_file)
+
+
+def load_net(net_file: Path) -> SumoNet:
+    """``sumolib``'s network, internal lanes included; every way of being unreadable is one ``HippodromeError``."""
+    _reject_foreign(net_file)
+    try:
+        return sumolib.net.readNet(str(net_file), withInternal=True, withFoes=False, lxml=False)
+    except (SAXException, OSError, EOFError, zlib.error) as error:
+        raise HippodromeError(f"{net_file}: broken network ({_one_line(error)}); write it again with netconvert") from error
+    except (KeyError, AttributeError, ValueError, TypeError, IndexError) as error:
+        reason = f"{type(error).__name__} {_one_line(error)}"
+        raise HippodromeError(f"{net_file}: not a consistent SUMO network ({reason}); write it again with netconvert") from error
+
+
+def road_network(net: SumoNet, net_file: Path) -> RoadNetwork:
+    """The passenger cars' part of a ``sumolib`` network; ``net_file`` is named in errors."""
+    lanes = _car_lanes(net)
+    if not any(not _is_internal(lane) for lane in lanes):
+        raise HippodromeError(f"{net_file}: no lane is open to passenger cars; choose a network with roads for cars")
+    index = {lane.getID(): i for i, lane in enumerate(lanes)}
+    successors = [_successors(lane, index) for lane in lanes]
+    shapes = _shapes(lanes, successors, net_file)
+    edge_ids = tuple(dict.fromkeys(lane.getEdge().getID() for lane in lanes))
+    edge_index = {edge: i for i, edge in enumerate(edge_ids)}
+    right_is_lower = not is_left_hand(net_file)
+    lower, upper = _side_lanes(lanes, index, -1), _side_lanes(lanes, index, 1)
+    return RoadNetwork(
+        lane_ids=tuple(index),
+        edge_ids=edge_ids,
+        lane_edge=np.array([edge_index[lane.getEdge().getID()] for lane in lanes], dtype=np.int32),
+        is_internal=np.array([_is_internal(lane) for lane in lanes], dtype=np.bool_),
+        width_m=np.array([lane.getWidth() for lane in lanes], dtype=np.float64),
+        speed_limit_mps=np.array([lane.getSpeed() for lane in lanes], dtype=np.float64),
+        points_m=np.concatenate(shapes),
+        point_start=_starts(shapes),
+        successor=np.array([s for after in successors for s in after], dtype=np.int32),
+        successor_start=_starts(successors),
+        left_lane=upper if right_is_lower else lower,
+        right_lane=lower if right_is_lower else upper,
+    )
+
+
+def is_left_hand(net_file: Path) -> bool:
+    """Driving side, from the ``<net lefthand=...>`` attribute, which sumolib does not keep."""
+    tag = _head(net_file).partition("<net ")[2].partition(">")[0]
+    return 'lefthand="true"' in tag or 'lefthand="1"' in tag
+
+
+def drivable_edges(network: RoadNetwork) -> IntArray:
+    """Edges, as sorted indices, of the longest strongly connected part: whoever starts there can always go on and come back."""
+    source, target = edge_links(network)
+    part = _parts(len(network.edge_ids), source, target, "strong")
+    length = edge_lengths_m(network)
+    weight = np.bincount(part, weights=length)
+    loops = np.bincount(part[source[part[source] == part[target]]], minlength=len(weight)) > 0
+    if not loops.any():
+        return np.empty(0, dtype=np.int32)
+    inside = (part == np.argmax(np.where(loops, weight, -1.0))) & (length > 0.0)
+    return np.flatnonzero(inside).astype(np.int32)
+
+
+def edge_links(network: RoadNetwork) -> tuple[IntArray, IntArray]:
+    """Pairs (source, target) of non-internal edges that a car can drive one after the other, sorted, without repeats."""
+    owner = np.repeat(np.arange(network.lane_count), np.diff(network.successor_start))
+    hop = coo_array((np.ones(len(owner), dtype=bool), (owner, network.successor)), shape=(network.lane_count,) * 2).tocsr()
+    inside = network.is_internal.astype(np.float64)
+    frontier = hop[np.flatnonzero(~network.is_internal)]
+    rows = np.flatnonzero(~network.is_internal)
+    pairs: set[tuple[int, int]] = set()
+    while frontier.nnz:
+        r, c = frontier.nonzero()
+        arrived = ~network.is_internal[c]
+        pairs.update(zip(network.lane_edge[rows[r[arrived]]].tolist(), network.lane_edge[c[arrived]].tolist(), strict=True))
+        frontier = (frontier * inside[None, :]).astype(bool) @ hop
+    table = np.array(sorted(pairs), dtype=np.int32).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
+
+
+def edge_lengths_m(network: RoadNetwork) -> FloatArray:
+    """Length (E,) of each edge's longest lane; 0 for edges inside junctions, which count with no road."""
+    length = np.zeros(len(network.edge_ids))
+    road = ~network.is_internal
+    np.maximum.at(length, network.lane_edge[road], network.lane_lengths_m()[road])
+    return length
+
+
+def check_network(net: SumoNet, network: RoadNetwork, net_file: Path) -> tuple[str, ...]:
+    """What is odd about a network but can be lived with, one line each. A network without any loop to drive is an error."""
+    drivable = drivable_edges(network)
+    if len(drivable) == 0:
+        raise HippodromeError(f"{net_file}: no closed loop for passenger cars, so no tour can return; add a way round or U-turns")
+    return (*_disconnected(network, drivable), *_zero_length(network), *_coincident(net))
+
+
+def _disconnected(network: RoadNetwork, drivable: IntArray) -> Iterable[str]:
+    length = edge_lengths_m(network)
+    roads = np.flatnonzero(length > 0.0)
+    rest = np.setdiff1d(roads, drivable)
+    if len(rest) == 0:
+        return
+    share = length[rest].sum() / length.sum()
+    source, target = edge_links(network)
+    parts = len(np.unique(_parts(len(network.edge_ids), source, target, "weak")[roads]))
+    example = network.edge_ids[rest[np.argmax(length[rest])]]
+    yield (
+        f"{len(rest)} of {len(roads)} edges ({share:.0%} of the length, for instance {example}) cannot be left or reached again "
+        f"and are not toured; {parts} disconnected part(s)"
+    )
+
+
+def _zero_length(network: RoadNetwork) -> Iterable[str]:
+    points = np.flatnonzero(network.lane_lengths_m() <= 1.5 * MIN_LANE_M)
+    if len(points):
+        yield f"{len(points)} zero-length lane(s), for instance {network.lane_ids[points[0]]}, stretched to {MIN_LANE_M} m"
+
+
+def _coincident(net: SumoNet) -> Iterable[str]:
+    nodes = [node for node in net.getNodes() if node.getIncoming() or node.getOutgoing()]
+    pairs = KDTree(np.array([node.getCoord()[:2] for node in nodes])).query_pairs(COINCIDENT_M)
+    for a, b in sorted(pairs):
+        one, other = nodes[a], nodes[b]
+        joined = {edge.getToNode() for edge in one.getOutgoing()} | {edge.getFromNode() for edge in one.getIncoming()}
+        if other not in joined:
+            x_m, y_m = one.getCoord()[:2]
+            yield f"nodes {one.getID()} and {other.getID()} coincide at ({x_m:.1f}, {y_m:.1f}) m but are not connected"
+
+
+def _parts(count: int, source: IntArray, target: IntArray, connection: str) -> IntArray:
+    graph = coo_array((np.ones(len(source)), (source, target)), shape=(count, count))
+    _, part = connected_components(graph, connection=connection)
+    labels: IntArray = part
+    return labels
+
+
+def _car_lanes(net: SumoNet) -> list[SumoLane]:
+    edges = [edge for edge in net.getEdges() if edge.getFunction() in ("", "internal")]
+    return [lane for edge in edges for lane in edge.getLanes() if lane.allows("passenger")]
+
+
+def _is_internal(lane: SumoLane) -> bool:
+    return bool(lane.getEdge().getFunction() == "internal")
+
+
+def _successors(lane: SumoLane, index: dict[str, int]) -> list[int]:
+    """Next lane of each connection: its first internal lane, whose own connection tells the next piece of the chain."""
+    after = (link.getViaLaneID() or link.getToLane().getID() for link in lane.getOutgoing() if link.allows("passenger"))
+    return sorted({index[lane_id] for lane_id in after if lane_id in index})
+
+
+def _side_lanes(lanes: list[SumoLane], index: dict[str, int], step: int) -> IntArray:
+    """Lane ``step`` places further on the same edge, -1 where none; lanes inside junctions have no neighbours to change to."""
+    side = np.full(len(lanes), -1, dtype=np.int32)
+    for i, lane in enumerate(lanes):
+        if not _is_internal(lane):
+            side[i] = index.get(f"{lane.getEdge().getID()}_{lane.getIndex() + step}", -1)
+    return side
+
+
+def _shapes(lanes: list[SumoLane], successors: list[list[int]], net_file: Path) -> list[FloatArray]:
+    shapes = [_without_repeats(np.array(lane.getShape(), dtype=np.float64).reshape(-1, 2)) for lane in lanes]
+    for lane, shape in zip(lanes, shapes, strict=True):
+        if len(shape) == 0 or not np.isfinite(shape).all():
+            raise HippodromeError(f"{net_file}: lane {lane.getID()} has no valid shape; write the network again with netconvert")
+    before = {s: i for i, after in enumerate(successors) for s in after}
+    return [
+        shape if len(shape) > 1 else _stretched(shape, _heading_near(shapes, successors[i], before.get(i)))
+        for i, shape in enumerate(shapes)
+    ]
+
+
+def _without_repeats(points_m: FloatArray) -> FloatArray:
+    """The polyline without points closer than ``MIN_LANE_M`` to their predecessor, which have no heading."""
+    kept: list[FloatArray] = []
+    for point in points_m:
+        if not kept or math.hypot(*(point - kept[-1])) >= MIN_LANE_M:
+            kept.append(point)
+    return np.array(kept).reshape(-1, 2)
+
+
+def _heading_near(shapes: list[FloatArray], after: list[int], before: int | None) -> float:
+    """Driving direction at a lane that is a point: that of the lane before, else of the lane after, else east."""
+    if before is not None and len(shapes[before]) > 1:
+        step = shapes[before][-1] - shapes[before][-2]
+    else:
+        step = next((shapes[s][1] - shapes[s][0] for s in after if len(shapes[s]) > 1), np.array([1.0, 0.0]))
+    return math.atan2(step[1], step[0])
+
+
+def _stretched(point_m: FloatArray, heading_rad: float) -> FloatArray:
+    return np.concatenate([point_m, point_m + MIN_LANE_M * np.array([math.cos(heading_rad), math.sin(heading_rad)])])
+
+
+def _starts(groups: Iterable[FloatArray | list[int]]) -> IntArray:
+    return np.concatenate([[0], np.cumsum([len(group) for group in groups])]).astype(np.int32)
+
+
+def _reject_foreign(net_file: Path) -> None:
+    if not net_file.is_file():
+        raise HippodromeError(f"{net_file}: no such network file; give a SUMO .net.xml or .net.xml.gz")
+    head = _head(net_file)
+    if "<net " in head or "<net>" in head:
+        return
+    if "<osm" in head or "<OpenDRIVE" in head:
+        raise HippodromeError(f"{net_file}: not a SUMO network but a map to convert; run netconvert on it first")
+    raise HippodromeError(f"{net_file}: not a SUMO network (no <net> element); give a .net.xml or .net.xml.gz")
+
+
+def _head(net_file: Path) -> str:
+    """The file's first 64 KiB: the netconvert settings comment and the root element."""
+    try:
+        raw = net_file.open("rb").read(1 << 16)
+        if raw[:2] == b"\x1f\x8b":
+            with gzip.open(net_file) as packed:
+                raw = packed.read(1 << 16)
+    except (OSError, EOFError, zlib.error) as error:
+        raise HippodromeError(f"{net_file}: unreadable ({_one_line(error)}); check the file") from error
+    return raw.decode("utf-8", errors="replace")
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,97 @@
+"""Which estimated samples have ground truth at their time stamps. Never across a gap, never below a coverage floor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hippodrome.core import se2
+from hippodrome.core.types import FloatArray, HippodromeError, IntArray, Trajectory
+
+MAX_GAP_S = 0.25  # ground truth comes at the camera's rate, 5-12 Hz; at 15 m/s a chord over 0.25 s leaves a curve by < 0.1 m
+MIN_COVERAGE = 0.95  # a score over less of the drive says little about the drive
+
+
+class CoverageError(HippodromeError):
+    """Too few estimated samples have ground truth."""
+
+
+class TrajectoryError(HippodromeError):
+    """A trajectory that is not one: wrong shape, not finite, or out of order."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Association:
+    """The matched samples of an estimate, in time order, with the reference at the same instants."""
+
+    t_s: FloatArray  # (N,)
+    estimate: FloatArray  # (N, 3)
+    reference: FloatArray  # (N, 3) interpolated
+    index: IntArray  # (N,) into the estimate
+    segment: IntArray  # (N,) stretch of the reference without gaps; pairs stay within one
+    total: int  # samples of the estimate, matched or not
+
+
+def associate(
+    estimate: Trajectory, reference: Trajectory, *, max_gap_s: float = MAX_GAP_S, min_coverage: float = MIN_COVERAGE
+) -> Association:
+    """Reference poses at the estimate's time stamps; linear in position, shortest arc in heading."""
+    check_trajectory(estimate, "estimate")
+    check_trajectory(reference, "reference")
+    after = np.clip(np.searchsorted(reference.t_s, estimate.t_s, side="left"), 1, max(len(reference.t_s) - 1, 1))
+    matched = _covered(estimate.t_s, reference.t_s, after, max_gap_s)
+    _require_coverage(int(matched.sum()), len(matched), min_coverage, max_gap_s)
+    index = np.flatnonzero(matched).astype(np.int32)
+    segment = np.concatenate([[0], np.cumsum(np.diff(reference.t_s) > max_gap_s)])
+    nearest = np.searchsorted(reference.t_s, estimate.t_s[index], side="right") - 1
+    return Association(
+        t_s=estimate.t_s[index],
+        estimate=estimate.poses[index],
+        reference=interpolate(reference, estimate.t_s[index]),
+        index=index,
+        segment=segment[nearest].astype(np.int32),
+        total=len(estimate.t_s),
+    )
+
+
+def interpolate(trajectory: Trajectory, t_s: FloatArray) -> FloatArray:
+    """Poses (N, 3) at times within the trajectory's span."""
+    columns = [np.interp(t_s, trajectory.t_s, trajectory.poses[:, axis]) for axis in (0, 1)]
+    heading = np.interp(t_s, trajectory.t_s, np.unwrap(trajectory.poses[:, 2]))
+    return np.column_stack([*columns, se2.wrap(heading)])
+
+
+def check_trajectory(trajectory: Trajectory, name: str) -> None:
+    """Raise unless times increase, all is finite and the shapes agree."""
+    t_s, poses = trajectory.t_s, trajectory.poses
+    if t_s.ndim != 1 or poses.shape != (len(t_s), 3):
+        raise TrajectoryError(f"{name}: times {t_s.shape} and poses {poses.shape} do not fit, expected (N,) and (N, 3)")
+    if len(t_s) == 0:
+        raise TrajectoryError(f"{name}: no samples")
+    if not (np.isfinite(t_s).all() and np.isfinite(poses).all()):
+        bad = int(np.flatnonzero(~(np.isfinite(t_s) & np.isfinite(poses).all(axis=1)))[0])
+        raise TrajectoryError(f"{name}: sample {bad} is not finite")
+    if (np.diff(t_s) <= 0.0).any():
+        bad = int(np.flatnonzero(np.diff(t_s) <= 0.0)[0]) + 1
+        raise TrajectoryError(f"{name}: time {t_s[bad]} of sample {bad} does not increase; sort the samples, drop duplicates")
+
+
+def _covered(t_s: FloatArray, reference_t_s: FloatArray, after: NDArray[np.intp], max_gap_s: float) -> NDArray[np.bool_]:
+    """Whether each time (N,) meets a reference sample or lies between two that are at most ``max_gap_s`` apart."""
+    last = len(reference_t_s) - 1
+    exact: NDArray[np.bool_] = (reference_t_s[np.minimum(after, last)] == t_s) | (reference_t_s[after - 1] == t_s)
+    if last == 0:
+        return exact
+    inside = (t_s > reference_t_s[after - 1]) & (t_s < reference_t_s[after])
+    short: NDArray[np.bool_] = reference_t_s[after] - reference_t_s[after - 1] <= max_gap_s
+    return exact | (inside & short)
+
+
+def _require_coverage(matched: int, total: int, min_coverage: float, max_gap_s: float) -> None:
+    if matched == 0 or matched < min_coverage * total:
+        raise CoverageError(
+            f"{matched} of {total} estimated samples have ground truth within gaps of {max_gap_s:g} s "
+            f"({matched / total:.1%}), the floor is {min_coverage:.0%}; check clocks and time spans"
+        )

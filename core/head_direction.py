@@ -1,0 +1,84 @@
+"""Head-direction network: a ring of integrator and calibration cells. Small immutable state, pure step functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hippodrome.core import attractor
+from hippodrome.core.attractor import CALIBRATION, INTEGRATOR, AttractorConfig
+from hippodrome.core.types import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadDirectionState:
+    """Beliefs of the two populations: ``mean_rad`` (2,), ``reliability`` (2,) in 1/rad^2."""
+
+    mean_rad: FloatArray
+    reliability: FloatArray
+
+
+def uniform(config: AttractorConfig) -> HeadDirectionState:
+    """No prior knowledge: both populations flat."""
+    return HeadDirectionState(np.zeros(2), np.full(2, config.floor * config.information))
+
+
+def known(heading_rad: float, config: AttractorConfig) -> HeadDirectionState:
+    """A known heading: the integrator holds E, the calibration cells their share of it."""
+    reliability = config.information * np.array([1.0, config.calibration_share])
+    return HeadDirectionState(np.full(2, attractor.wrap(heading_rad)), reliability)
+
+
+def integrate(state: HeadDirectionState, omega_radps: float, dt_s: float, sq_sigma_rad: float = 0.0) -> HeadDirectionState:
+    """Path integration: both peaks turn by omega dt; ``sq_sigma_rad`` is the variance that the motion adds (0: as printed)."""
+    mean = attractor.wrap(state.mean_rad + omega_radps * dt_s)
+    reliability = attractor.widen(state.reliability, sq_sigma_rad) if sq_sigma_rad else state.reliability
+    return HeadDirectionState(mean, reliability)
+
+
+def inhibit(state: HeadDirectionState, dt_s: float, config: AttractorConfig) -> HeadDirectionState:
+    """Mutual and global inhibition, Eqs. (3)-(7), Li et al. 2025."""
+    mean, reliability = state.mean_rad.reshape(1, 2, 1), state.reliability.reshape(1, 2, 1)
+    inhibited = attractor.inhibit(mean, reliability, dt_s, config, np.array([config.information]))
+    return HeadDirectionState(state.mean_rad, inhibited.reshape(2))
+
+
+def inject(state: HeadDirectionState, heading_rad: float, reliability: float, config: AttractorConfig) -> HeadDirectionState:
+    """Eqs. (13)-(14), Li et al. 2025; mode "default" then hands the fused belief back to both populations."""
+    mean, information = state.mean_rad.copy(), state.reliability.copy()
+    mean[CALIBRATION], information[CALIBRATION] = attractor.inject(
+        mean[CALIBRATION], information[CALIBRATION], heading_rad, reliability
+    )
+    injected = HeadDirectionState(mean, information)
+    return injected if config.mode == "paper" else hand_back(injected, config)
+
+
+def hand_back(state: HeadDirectionState, config: AttractorConfig) -> HeadDirectionState:
+    """The fused belief of Eqs. (15)-(16) to both populations, total information kept. Without it an injection never
+    reaches the integrator (nothing in the printed equations moves from one population to the other).
+    """
+    heading_rad, reliability = read_out(state)
+    shares = np.array([1.0 - config.calibration_share, config.calibration_share])
+    return HeadDirectionState(np.full(2, heading_rad), reliability * shares)
+
+
+def challenge(state: HeadDirectionState, heading_rad: float, reliability: float) -> HeadDirectionState:
+    """Calibration cells leave for a conflicting heading; the integrator keeps its own, and the two compete."""
+    return HeadDirectionState(
+        np.array([state.mean_rad[INTEGRATOR], attractor.wrap(heading_rad)]),
+        np.array([state.reliability[INTEGRATOR], reliability]),
+    )
+
+
+def adopt(state: HeadDirectionState, config: AttractorConfig) -> HeadDirectionState:
+    """The challenger has won: both populations snap to the calibration cells' belief (blending would please neither)."""
+    shares = np.array([1.0 - config.calibration_share, config.calibration_share])
+    return HeadDirectionState(np.full(2, state.mean_rad[CALIBRATION]), state.reliability[CALIBRATION] * shares)
+
+
+def read_out(state: HeadDirectionState) -> tuple[float, float]:
+    """Eqs. (15)-(16), Li et al. 2025: heading_rad and its reliability in 1/rad^2."""
+    (mu_inte, mu_cali), (r_inte, r_cali) = state.mean_rad, state.reliability
+    heading_rad, reliability = attractor.read_out(mu_inte, r_inte, mu_cali, r_cali)
+    return float(heading_rad), float(reliability)

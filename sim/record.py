@@ -1,0 +1,187 @@
+"""From a scenario to recordings: simulate a drive, sense it, draw it chunk by chunk. Nothing that is on disk is made again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from hippodrome.sim.drive import simulate_drive
+from hippodrome.sim.episode import Samples, camera_divider, draw_frame, sample_drive
+from hippodrome.sim.files import sha256_of
+from hippodrome.sim.recording import (
+    CHUNK_FRAMES,
+    MANIFEST,
+    Recording,
+    chunk_count,
+    chunk_path,
+    open_recording,
+    read_arrays,
+    read_samples,
+    seal,
+    write_arrays,
+    write_chunk,
+)
+from hippodrome.sim.render.renderer import FrameRenderer
+from hippodrome.sim.scenario import DriveSpec, Scenario
+from hippodrome.sim.scene.build import build_scene
+from hippodrome.sim.self_motion import sense_self_motion
+from hippodrome.sim.town import build_town
+from hippodrome.sim.types import Drive, Town, TrafficLog
+
+Role: TypeAlias = Literal["mapping", "localization"]
+ROLES: tuple[Role, ...] = ("mapping", "localization")
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingPlan:
+    """One drive of a scenario and the folder below which towns and recordings live."""
+
+    scenario: Scenario
+    role: Role
+    root: Path
+
+    @property
+    def drive_spec(self) -> DriveSpec:
+        spec: DriveSpec = getattr(self.scenario, self.role)
+        return spec
+
+    @property
+    def seed(self) -> int:
+        """A seed of its own for each role, so that the two drives differ in route, traffic and noise."""
+        return int(np.random.SeedSequence([self.scenario.seed, ROLES.index(self.role)]).generate_state(1)[0] >> 1)
+
+    def town(self) -> Town:
+        return _town(self.scenario, self.root)
+
+    def content(self) -> dict[str, Any]:
+        """All that the recording's bytes depend on, as JSON values."""
+        scenario = self.scenario
+        return {
+            "scenario": scenario.name,
+            "role": self.role,
+            "seed": scenario.seed,
+            "town": scenario.town.model_dump(mode="json", exclude={"network"}),
+            "network_sha256": sha256_of(self.town().net_file),
+            "drive": self.drive_spec.model_dump(mode="json"),
+            "camera": scenario.camera.model_dump(mode="json"),
+            "odometry_rate_hz": scenario.odometry_rate_hz,
+            "noise": scenario.self_motion_noise.model_dump(mode="json"),
+            "versions": {name: version(name) for name in ("eclipse-sumo", "highway-env", "numpy", "pyrender")},
+            "code_sha256": _code_sha256(),
+        }
+
+    def folder(self) -> Path:
+        key = hashlib.sha256(json.dumps(self.content(), sort_keys=True).encode()).hexdigest()[:16]
+        return self.root / "recordings" / f"{self.scenario.name}-{self.role}-{key}"
+
+
+@lru_cache(maxsize=4)
+def _town(scenario: Scenario, root: Path) -> Town:
+    return build_town(scenario.town, scenario.seed, root / "towns")
+
+
+@lru_cache(maxsize=1)
+def _code_sha256() -> str:
+    """Of the code that makes recordings: a changed renderer must not be served old frames."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(path.relative_to(Path(__file__).parent).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def prepare(plan: RecordingPlan) -> list[int]:
+    """Simulate and sense the drive unless that is on disk already; the chunks of frames still to draw."""
+    folder = plan.folder()
+    if (folder / MANIFEST).exists():
+        return []
+    if not (folder / "samples.npz").exists():
+        _simulate(plan, folder)
+    samples = read_samples(folder / "samples.npz")
+    return [chunk for chunk in range(chunk_count(samples)) if not chunk_path(folder, chunk).exists()]
+
+
+def _simulate(plan: RecordingPlan, folder: Path) -> None:
+    scenario, town, noise = plan.scenario, plan.town(), plan.scenario.self_motion_noise
+    spec = plan.drive_spec
+    ego = spec.ego.model_copy(update={"lateral_wander_m": max(spec.ego.lateral_wander_m, noise.lateral_wander_m)})
+    drive = simulate_drive(town, spec.tour, spec.traffic, ego, plan.seed)
+    motion = sense_self_motion(drive, scenario.odometry_rate_hz, noise, np.random.default_rng([plan.seed, 1]))
+    samples = sample_drive(drive, town.network, motion, camera_divider(scenario.camera, scenario.odometry_rate_hz))
+    _write_drive(folder / "drive.npz", drive)
+    write_arrays(folder / "samples.npz", {field.name: np.asarray(getattr(samples, field.name)) for field in fields(samples)})
+
+
+def render_chunk(plan: RecordingPlan, chunk: int) -> int:
+    """Draw one chunk of frames to disk; the number of frames."""
+    folder = plan.folder()
+    samples, drive = _episode_of(folder)
+    first = chunk * CHUNK_FRAMES
+    numbers = range(first, min(first + CHUNK_FRAMES, len(samples.frame_steps)))
+    renderer, conditions = _renderer(plan), plan.drive_spec.conditions
+    frames = (draw_frame(renderer, drive, samples, number, conditions, plan.seed) for number in numbers)
+    write_chunk(chunk_path(folder, chunk), first, frames)
+    return len(numbers)
+
+
+@lru_cache(maxsize=1)
+def _episode_of(folder: Path) -> tuple[Samples, Drive]:
+    return read_samples(folder / "samples.npz"), _read_drive(folder / "drive.npz")
+
+
+_live: list[tuple[tuple[Scenario, Role], FrameRenderer]] = []
+
+
+def _renderer(plan: RecordingPlan) -> FrameRenderer:
+    """The process's one live renderer: a second EGL context beside it would break it."""
+    key = (plan.scenario, plan.role)
+    if not _live or _live[0][0] != key:
+        close_renderer()
+        scene = build_scene(plan.town(), plan.scenario.seed, plan.drive_spec.conditions)
+        _live.append((key, FrameRenderer(scene, plan.scenario.camera)))
+    return _live[0][1]
+
+
+def close_renderer() -> None:
+    """Free the live renderer, if there is one."""
+    for _, renderer in _live:
+        renderer.close()
+    _live.clear()
+
+
+def finish(plan: RecordingPlan) -> Recording:
+    """Seal a recording whose chunks are all drawn, or open the finished one."""
+    folder = plan.folder()
+    if (folder / MANIFEST).exists():
+        return open_recording(folder)
+    drive = _read_drive(folder / "drive.npz")
+    tour = {"coverage": round(drive.coverage, 4), "revisit_share": round(drive.revisit_share, 4)}
+    return seal(folder, {**plan.content(), "tour": tour}, read_samples(folder / "samples.npz"))
+
+
+def record(plan: RecordingPlan) -> Recording:
+    """The whole recording in this process."""
+    for chunk in prepare(plan):
+        render_chunk(plan, chunk)
+    return finish(plan)
+
+
+def _write_drive(path: Path, drive: Drive) -> None:
+    log = {f"traffic_{field.name}": getattr(drive.traffic, field.name) for field in fields(TrafficLog)}
+    write_arrays(path, {**{field.name: getattr(drive, field.name) for field in fields(Drive) if field.name != "traffic"}, **log})
+
+
+def _read_drive(path: Path) -> Drive:
+    log_names = [field.name for field in fields(TrafficLog)]
+    names = [field.name for field in fields(Drive) if field.name != "traffic"]
+    arrays = read_arrays(path, [*names, *(f"traffic_{name}" for name in log_names)])
+    log = TrafficLog(**{name: arrays.pop(f"traffic_{name}") for name in log_names})
+    coverage, revisit_share = float(arrays.pop("coverage")), float(arrays.pop("revisit_share"))
+    return Drive(**arrays, traffic=log, coverage=coverage, revisit_share=revisit_share)

@@ -1,0 +1,171 @@
+"""Recordings: an episode on disk, keyed by its content, made in resumable pieces, read back lazily.
+
+A recording is a folder. ``samples.npz`` and ``drive.npz`` come first, then chunks of frames (ZIP archives of PNG images, which
+any tool opens), then ``manifest.json`` with the hash of each file: its presence says that all is there. Every file is whole or
+absent, so a killed run continues where it was, and the bytes do not depend on how many processes made them.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from hippodrome.core.types import Frame, HippodromeError, Observation, Step, Trajectory
+from hippodrome.sim.episode import Samples
+from hippodrome.sim.files import replacing, sha256_of
+
+FORMAT = 1
+CHUNK_FRAMES = 250  # a few seconds of rendering: what a kill can cost at most, and what a second process can take over
+PNG_LEVEL = 1  # fastest: level 3 saves 6 % of the space for twice the time
+MANIFEST = "manifest.json"
+MAX_STEPS = 20_000_000  # refuse hostile sizes before memory is taken: 20 days at 11 Hz
+
+
+class RecordingError(HippodromeError):
+    """A recording that cannot be read, or is not one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """A finished recording. Iterating yields (Observation, GroundTruth); frames are decoded when their step is reached."""
+
+    folder: Path
+    manifest: dict[str, Any]
+    samples: Samples
+
+    def __iter__(self) -> Iterator[Step]:
+        for i, observation in enumerate(self.observations()):
+            yield observation, self.samples.ground_truth(i)
+
+    def observations(self) -> Iterator[Observation]:
+        """What the mapper and the localizer may have: no ground truth travels with it."""
+        for i, number in enumerate(self.samples.frame):
+            yield self.samples.observation(i, self.frame(int(number)) if number >= 0 else None)
+
+    def ground_truth(self) -> Trajectory:
+        """The reference for scoring."""
+        return Trajectory(t_s=self.samples.t_s, poses=self.samples.poses_m)
+
+    @property
+    def frame_count(self) -> int:
+        return len(self.samples.frame_steps)
+
+    def frame(self, number: int, side: str = "") -> Frame:
+        """RGB frame (H, W, 3); ``side`` is "r" for the right image of a stereo pair."""
+        path = chunk_path(self.folder, number // CHUNK_FRAMES)
+        try:
+            blob = _open_chunk(path, path.stat().st_mtime_ns).read(frame_name(number, side))
+        except (OSError, KeyError, zipfile.BadZipFile, zipfile.LargeZipFile) as error:
+            raise RecordingError(
+                f"{path}: frame {number} cannot be read ({error}); delete the recording to render it anew"
+            ) from None
+        image = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
+        if image is None:
+            raise RecordingError(f"{path}: frame {number} is not a PNG image; delete the recording to render it anew")
+        return np.ascontiguousarray(image[:, :, ::-1])
+
+
+@lru_cache(maxsize=4)
+def _open_chunk(path: Path, _modified_ns: int) -> zipfile.ZipFile:
+    return zipfile.ZipFile(path)
+
+
+def chunk_path(folder: Path, chunk: int) -> Path:
+    return folder / f"frames-{chunk:04d}.zip"
+
+
+def chunk_count(samples: Samples) -> int:
+    return -(-len(samples.frame_steps) // CHUNK_FRAMES)
+
+
+def frame_name(number: int, side: str = "") -> str:
+    return f"{number:06d}{side}.png"
+
+
+def write_chunk(path: Path, first: int, frames: Iterator[tuple[Frame, ...]]) -> None:
+    """One archive of consecutive frames; (left, right) pairs become ``N.png`` and ``Nr.png``."""
+    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
+        for number, images in enumerate(frames, start=first):
+            for side, image in zip(("", "r"), images, strict=False):
+                _, png = cv2.imencode(".png", image[:, :, ::-1], [cv2.IMWRITE_PNG_COMPRESSION, PNG_LEVEL])
+                archive.writestr(zipfile.ZipInfo(frame_name(number, side)), png.tobytes())
+
+
+def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
+    """An npz archive (NumPy writes it with fixed dates: same arrays, same bytes)."""
+    with replacing(path) as temporary, temporary.open("wb") as stream:
+        np.savez(stream, **arrays)
+
+
+def read_samples(path: Path) -> Samples:
+    """Samples back from disk, checked. Raises RecordingError."""
+    try:
+        arrays = read_arrays(path, [field.name for field in fields(Samples)])
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile, MemoryError) as error:
+        raise RecordingError(f"{path}: not a readable sample file ({error}); delete the recording to make it anew") from None
+    count = len(arrays["t_s"])
+    same = all(len(array) == count for name, array in arrays.items() if name != "lane_ids")
+    if not same or count == 0 or count > MAX_STEPS or arrays["poses_m"].shape != (count, 3):
+        raise RecordingError(f"{path}: its arrays do not fit together; delete the recording to make it anew")
+    return Samples(**{**arrays, "lane_ids": tuple(str(name) for name in arrays["lane_ids"])})
+
+
+def read_arrays(path: Path, names: list[str]) -> dict[str, np.ndarray[Any, np.dtype[Any]]]:
+    """Arrays of an npz file that are stored as they are: a packed one could claim any size and is refused."""
+    blob = path.read_bytes()
+    with zipfile.ZipFile(io.BytesIO(blob)) as archive:
+        if any(item.compress_type != zipfile.ZIP_STORED or item.file_size > len(blob) for item in archive.infolist()):
+            raise ValueError("packed arrays")
+    with np.load(io.BytesIO(blob), allow_pickle=False) as data:
+        return {name: data[name] for name in names}
+
+
+def seal(folder: Path, content: dict[str, Any], samples: Samples) -> Recording:
+    """Write the manifest: what the recording was made from, and the hash of each of its files."""
+    names = ["samples.npz", "drive.npz", *(chunk_path(folder, chunk).name for chunk in range(chunk_count(samples)))]
+    manifest = {"format": FORMAT, **content, "sha256": {name: sha256_of(folder / name) for name in names}}
+    with replacing(folder / MANIFEST) as temporary:
+        temporary.write_text(json.dumps(manifest, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    return Recording(folder, manifest, samples)
+
+
+def open_recording(folder: Path, verify: bool = True) -> Recording:
+    """A finished recording; ``verify`` compares every file with its hash first. Raises RecordingError."""
+    path = folder / MANIFEST
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        files = manifest["sha256"]
+        version = manifest["format"]
+    except FileNotFoundError:
+        raise RecordingError(
+            f"{folder}: not a finished recording (no {MANIFEST}); run `hippodrome render` to finish it"
+        ) from None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise RecordingError(f"{path}: not a recording's manifest ({error})") from None
+    if version != FORMAT:
+        raise RecordingError(f"{path}: recording format {version}, this version reads {FORMAT}")
+    if not isinstance(files, dict) or "samples.npz" not in files:
+        raise RecordingError(f"{path}: not a recording's manifest (no file list)")
+    for name, digest in files.items():
+        _check_file(folder, name, digest if verify else None)
+    samples = read_samples(folder / "samples.npz")
+    if any(chunk_path(folder, chunk).name not in files for chunk in range(chunk_count(samples))):
+        raise RecordingError(f"{path}: frames are missing from the manifest; delete the recording to render it anew")
+    return Recording(folder, manifest, samples)
+
+
+def _check_file(folder: Path, name: str, digest: str | None) -> None:
+    path = folder / name
+    if Path(name).name != name or not path.is_file():
+        raise RecordingError(f"{path}: named in the manifest and not there; delete the recording to render it anew")
+    if digest is not None and sha256_of(path) != digest:
+        raise RecordingError(f"{path}: truncated or changed since it was recorded; delete the recording to render it anew")

@@ -1,0 +1,84 @@
+"""The scenario: one model of everything that a run depends on. Each part is declared beside the code that it configures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from hippodrome.core.localizer import LocalizerConfig
+from hippodrome.core.mapper import MapperConfig
+from hippodrome.core.refine import RefineConfig
+from hippodrome.sim.ego import EgoSpec
+from hippodrome.sim.episode import camera_divider
+from hippodrome.sim.render.camera import CameraSpec
+from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.self_motion import NoiseLevel, SelfMotionNoise, noise_of
+from hippodrome.sim.spec import Spec
+from hippodrome.sim.tour import TourSpec
+from hippodrome.sim.town import TownSpec
+from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.yaml_file import load_yaml
+
+
+class DriveSpec(Spec):
+    """One drive through the town: where, among whom, in which light."""
+
+    tour: TourSpec = TourSpec()
+    traffic: TrafficSpec = TrafficSpec()
+    ego: EgoSpec = EgoSpec()
+    conditions: Conditions = Conditions()
+
+
+class Thresholds(Spec):
+    """Limits that make ``hippodrome eval`` exit with 1; a limit left out is not checked."""
+
+    method: str = "topometric (paper)"  # the row that the limits speak of
+    ape_mean_m: Annotated[float, Field(gt=0)] | None = None
+    rpe_mean_m: Annotated[float, Field(gt=0)] | None = None
+    localization_error_mean_m: Annotated[float, Field(gt=0)] | None = None
+    localization_success: bool = False  # True: localization must succeed
+    false_fixes: Annotated[int, Field(ge=0)] | None = None
+
+
+class Scenario(Spec):
+    """A town, two different drives through it (one to map, one to localize), what is sensed, and how the result is judged."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+    description: str = ""
+    seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
+    town: TownSpec = TownSpec()
+    camera: CameraSpec = CameraSpec()
+    odometry_rate_hz: Annotated[float, Field(gt=0, le=200)] = 10.0
+    noise: NoiseLevel | SelfMotionNoise = "paper"
+    mapping: DriveSpec = DriveSpec()
+    localization: DriveSpec = DriveSpec()
+    mapper: MapperConfig = MapperConfig()
+    refine: RefineConfig = RefineConfig()
+    localizer: LocalizerConfig = LocalizerConfig()
+    thresholds: Thresholds = Thresholds()
+
+    @model_validator(mode="after")
+    def _rates_fit(self) -> Scenario:
+        camera_divider(self.camera, self.odometry_rate_hz)
+        return self
+
+    @property
+    def noise_name(self) -> str:
+        return self.noise if isinstance(self.noise, str) else "custom"
+
+    @property
+    def self_motion_noise(self) -> SelfMotionNoise:
+        return noise_of(self.noise)
+
+
+def load_scenario(path: Path, network: Path | None = None, seed: int | None = None) -> Scenario:
+    """The scenario in ``path``; ``network`` and ``seed`` replace its own. A relative network is relative to the file."""
+    scenario = load_yaml(path, Scenario)
+    town = scenario.town
+    if network is not None:
+        town = TownSpec(network=network.resolve())
+    elif town.network is not None:
+        town = town.model_copy(update={"network": (path.parent / town.network).resolve()})
+    return scenario.model_copy(update={"town": town, "seed": scenario.seed if seed is None else seed})

@@ -197,7 +197,7 @@ def update_query_mean(state: QueryMean, descriptor: Descriptor, config: ViewCell
 def score(bank: ViewCellBank, descriptor: Descriptor, query_mean: QueryMean, config: ViewCellConfig) -> Float32Array:
     """Similarity (C, 2 max_shift + 1) of one query to all C templates at each sideways shift; higher is more alike.
 
-    Column ``max_shift + s`` compares the query moved ``s`` columns to the right (the vehicle's heading was further right then).
+    Column ``max_shift + s`` compares the query moved ``s`` columns to the right: positive when it looks further right.
     "gradient": cosine of the mean-free descriptors. "grey": minus the mean absolute difference, grey levels.
     """
     if bank.kind == "grey":

@@ -70,15 +70,22 @@ def phase_reliability(reliability: FloatArray, period: FloatArray) -> FloatArray
 
 @njit(cache=True)
 def _integrate(
-    state_mean: FloatArray, state_reliability: FloatArray, period: FloatArray, step: FloatArray, sq_sigma: FloatArray
+    old_mean: FloatArray, old_reliability: FloatArray, period: FloatArray, step: FloatArray, sq_sigma: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    mean, reliability = np.empty_like(state_mean), np.empty_like(state_reliability)
+    mean, reliability = np.empty_like(old_mean), old_reliability.copy()
     for m in range(mean.shape[0]):
         per_length = 2.0 * math.pi / period[m]
-        for p in range(2):
-            for a in range(2):
-                mean[m, p, a] = wrap(state_mean[m, p, a] + step[p, a] * per_length)
-                reliability[m, p, a] = attractor.widen(state_reliability[m, p, a], sq_sigma[a] * per_length**2)
+        for a in range(2):
+            for p in range(2):
+                mean[m, p, a] = wrap(old_mean[m, p, a] + step[p, a] * per_length)
+            if sq_sigma[a] != 0.0:
+                reliability[m, 0, a], reliability[m, 1, a] = attractor.forget(
+                    old_mean[m, 0, a],
+                    old_reliability[m, 0, a],
+                    old_mean[m, 1, a],
+                    old_reliability[m, 1, a],
+                    sq_sigma[a] * per_length**2,
+                )
     return mean, reliability
 
 
@@ -95,8 +102,7 @@ def integrate(state: GridState, step: FloatArray, sq_sigma: FloatArray) -> GridS
 def displacement(heading_rad: FloatArray, speed: float, dt_s: float) -> FloatArray:
     """Displacements (2 populations, 2 axes) of motion along ``heading_rad`` (2,): x += cos(theta) v dt, y += sin(theta) v dt."""
     distance = speed * dt_s
-    step: FloatArray = np.stack([distance * np.cos(heading_rad), distance * np.sin(heading_rad)], axis=-1)
-    return step
+    return np.array([[distance * math.cos(theta), distance * math.sin(theta)] for theta in heading_rad.tolist()])
 
 
 def inhibit(state: GridState, dt_s: float, config: AttractorConfig) -> GridState:
@@ -105,17 +111,19 @@ def inhibit(state: GridState, dt_s: float, config: AttractorConfig) -> GridState
     return GridState(state.period, state.mean_rad, inhibited)
 
 
-def inject(state: GridState, position: FloatArray, reliability: FloatArray, config: AttractorConfig) -> GridState:
-    """Eqs. (13)-(14), Li et al. 2025, at a position (2,) with reliability (2,) per axis in 1/length^2.
-
-    Mode "default" then hands the fused belief back to both populations.
-    """
+def stimulate(state: GridState, position: FloatArray, reliability: FloatArray) -> GridState:
+    """Eqs. (13)-(14), Li et al. 2025, on the calibration cells, at a position (2,); reliability (2,) in 1/length^2."""
     mean, total = state.mean_rad.copy(), state.reliability.copy()
     mean[:, 1], total[:, 1] = attractor.inject(
         mean[:, 1], total[:, 1], phase(position, state.period), phase_reliability(reliability, state.period)
     )
-    injected = GridState(state.period, mean, total)
-    return injected if config.mode == "paper" else hand_back(injected, config)
+    return GridState(state.period, mean, total)
+
+
+def inject(state: GridState, position: FloatArray, reliability: FloatArray, config: AttractorConfig) -> GridState:
+    """One injection: Eqs. (13)-(14), Li et al. 2025; mode "default" then hands the fused belief back to both populations."""
+    stimulated = stimulate(state, position, reliability)
+    return stimulated if config.mode == "paper" else hand_back(stimulated, config)
 
 
 def hand_back(state: GridState, config: AttractorConfig) -> GridState:
@@ -132,9 +140,9 @@ def challenge(state: GridState, position: FloatArray, reliability: FloatArray) -
     return GridState(state.period, mean, total)
 
 
-def adopt(state: GridState, config: AttractorConfig) -> GridState:
-    """The challenger has won: both populations snap to the calibration cells' belief."""
-    return _shared(state, state.mean_rad[:, 1], state.reliability[:, 1], config)
+def adopt(state: GridState, population: int, config: AttractorConfig) -> GridState:
+    """The conflict is decided: both populations snap to the winning one's belief."""
+    return _shared(state, state.mean_rad[:, population], state.reliability[:, population], config)
 
 
 def _shared(state: GridState, mean: FloatArray, total: FloatArray, config: AttractorConfig) -> GridState:
@@ -155,9 +163,8 @@ def read_out(state: GridState, near: FloatArray, reach: float = 0.0) -> tuple[Fl
 
     The modules hold the same belief on different tori, not independent ones: their reliabilities average, they do not add.
     """
-    mean, reliability = fused(state)
-    per_length = (TURN / state.period[:, None]) ** 2
-    return decode(mean, reliability, state.period, near, reach), np.mean(reliability * per_length, axis=0)
+    position, reliability = _read_out(state.mean_rad, state.reliability, state.period, near, reach)
+    return position, reliability
 
 
 def population_position(state: GridState, population: int, near: FloatArray, reach: float = 0.0) -> FloatArray:
@@ -196,3 +203,18 @@ def _decode(mean: FloatArray, reliability: FloatArray, period: FloatArray, near:
             if cost < best_cost or (cost == best_cost and abs(candidate - near[a]) < abs(best[a] - near[a])):
                 best[a], best_cost = candidate, cost
     return best
+
+
+@njit(cache=True)
+def _read_out(
+    mean_rad: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float
+) -> tuple[FloatArray, FloatArray]:
+    modules = len(period)
+    mean_f, total, per_axis = np.empty((modules, 2)), np.empty((modules, 2)), np.zeros(2)
+    for m in range(modules):
+        for a in range(2):
+            mean_f[m, a], total[m, a] = attractor.read_out(
+                mean_rad[m, 0, a], reliability[m, 0, a], mean_rad[m, 1, a], reliability[m, 1, a]
+            )
+            per_axis[a] += total[m, a] * (2.0 * math.pi / period[m]) ** 2 / modules
+    return _decode(mean_f, total, period, near, reach), per_axis

@@ -32,9 +32,12 @@ def known(heading_rad: float, config: AttractorConfig) -> HeadDirectionState:
 
 def integrate(state: HeadDirectionState, omega_radps: float, dt_s: float, sq_sigma_rad: float = 0.0) -> HeadDirectionState:
     """Path integration: both peaks turn by omega dt; ``sq_sigma_rad`` is the variance that the motion adds (0: as printed)."""
-    mean = attractor.wrap(state.mean_rad + omega_radps * dt_s)
-    reliability = attractor.widen(state.reliability, sq_sigma_rad) if sq_sigma_rad else state.reliability
-    return HeadDirectionState(mean, reliability)
+    turned = omega_radps * dt_s
+    (mu_inte, mu_cali), (r_inte, r_cali) = state.mean_rad.tolist(), state.reliability.tolist()
+    mean = np.array([attractor.wrap(mu_inte + turned), attractor.wrap(mu_cali + turned)])
+    if sq_sigma_rad == 0.0:
+        return HeadDirectionState(mean, state.reliability)
+    return HeadDirectionState(mean, np.array(attractor.forget(mu_inte, r_inte, mu_cali, r_cali, sq_sigma_rad)))
 
 
 def inhibit(state: HeadDirectionState, dt_s: float, config: AttractorConfig) -> HeadDirectionState:
@@ -44,14 +47,16 @@ def inhibit(state: HeadDirectionState, dt_s: float, config: AttractorConfig) -> 
     return HeadDirectionState(state.mean_rad, inhibited.reshape(2))
 
 
+def stimulate(state: HeadDirectionState, heading_rad: float, reliability: float) -> HeadDirectionState:
+    """Eqs. (13)-(14), Li et al. 2025, on the calibration cells."""
+    mu_cali, r_cali = attractor.inject(state.mean_rad[CALIBRATION], state.reliability[CALIBRATION], heading_rad, reliability)
+    return HeadDirectionState(np.array([state.mean_rad[INTEGRATOR], mu_cali]), np.array([state.reliability[INTEGRATOR], r_cali]))
+
+
 def inject(state: HeadDirectionState, heading_rad: float, reliability: float, config: AttractorConfig) -> HeadDirectionState:
-    """Eqs. (13)-(14), Li et al. 2025; mode "default" then hands the fused belief back to both populations."""
-    mean, information = state.mean_rad.copy(), state.reliability.copy()
-    mean[CALIBRATION], information[CALIBRATION] = attractor.inject(
-        mean[CALIBRATION], information[CALIBRATION], heading_rad, reliability
-    )
-    injected = HeadDirectionState(mean, information)
-    return injected if config.mode == "paper" else hand_back(injected, config)
+    """One injection: Eqs. (13)-(14), Li et al. 2025; mode "default" then hands the fused belief back to both populations."""
+    stimulated = stimulate(state, heading_rad, reliability)
+    return stimulated if config.mode == "paper" else hand_back(stimulated, config)
 
 
 def hand_back(state: HeadDirectionState, config: AttractorConfig) -> HeadDirectionState:
@@ -71,14 +76,14 @@ def challenge(state: HeadDirectionState, heading_rad: float, reliability: float)
     )
 
 
-def adopt(state: HeadDirectionState, config: AttractorConfig) -> HeadDirectionState:
-    """The challenger has won: both populations snap to the calibration cells' belief (blending would please neither)."""
+def adopt(state: HeadDirectionState, population: int, config: AttractorConfig) -> HeadDirectionState:
+    """The conflict is decided: both populations snap to the winning one's belief (blending would please neither)."""
     shares = np.array([1.0 - config.calibration_share, config.calibration_share])
-    return HeadDirectionState(np.full(2, state.mean_rad[CALIBRATION]), state.reliability[CALIBRATION] * shares)
+    return HeadDirectionState(np.full(2, state.mean_rad[population]), state.reliability[population] * shares)
 
 
 def read_out(state: HeadDirectionState) -> tuple[float, float]:
     """Eqs. (15)-(16), Li et al. 2025: heading_rad and its reliability in 1/rad^2."""
-    (mu_inte, mu_cali), (r_inte, r_cali) = state.mean_rad, state.reliability
+    (mu_inte, mu_cali), (r_inte, r_cali) = state.mean_rad.tolist(), state.reliability.tolist()
     heading_rad, reliability = attractor.read_out(mu_inte, r_inte, mu_cali, r_cali)
     return float(heading_rad), float(reliability)

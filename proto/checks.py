@@ -1,0 +1,59 @@
+"""What must hold in every stored map: finite values, indices that point at something."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hippodrome.core.types import CognitiveMap, EdgeKind, MatchStatus, RoadMatch
+from hippodrome.proto.arrays import Array, FieldError
+
+
+def check_map(cognitive_map: CognitiveMap) -> None:
+    """Raise ``FieldError`` naming the first field and row that no map can have."""
+    vertices = len(cognitive_map.t_s)
+    for name, array in _floats(cognitive_map):
+        _require(np.isfinite(array), name, "not finite")
+    edges = cognitive_map.edges
+    for name, index, count in (
+        ("view_cell", cognitive_map.view_cell, len(cognitive_map.view_cells.templates)),
+        ("edges.source", edges.source, vertices),
+        ("edges.target", edges.target, vertices),
+        ("edges.kind", edges.kind, len(EdgeKind)),
+        ("visits.vertex", cognitive_map.visits.vertex, vertices),
+    ):
+        _require((index >= 0) & (index < count), name, f"outside 0..{count - 1}")
+    if cognitive_map.road_match is not None:
+        _check_road_match(cognitive_map.road_match)
+
+
+def _check_road_match(match: RoadMatch) -> None:
+    lanes = len(match.lane_ids)
+    _require((match.lane >= -1) & (match.lane < lanes), "road_match.lane", f"outside -1..{lanes - 1}")
+    _require(np.isfinite(match.position_m) == (match.lane >= 0), "road_match.position_m", "finite without a lane or the reverse")
+    _require(match.status < len(MatchStatus), "road_match.status", f"outside 0..{len(MatchStatus) - 1}")
+
+
+def _floats(cognitive_map: CognitiveMap) -> Iterator[tuple[str, Array]]:
+    """Every array of the map that must be finite, with its name."""
+    yield "t_s", cognitive_map.t_s
+    yield "poses", cognitive_map.poses
+    yield "view_cells.mean", cognitive_map.view_cells.mean
+    yield "edges.motion", cognitive_map.edges.motion
+    yield "edges.sigma", cognitive_map.edges.sigma
+    yield "edges.margin", cognitive_map.edges.margin
+    yield "visits.t_s", cognitive_map.visits.t_s
+    yield "visits.motion", cognitive_map.visits.motion
+    for name in ("head_mean_rad", "head_reliability", "grid_period", "grid_mean_rad", "grid_reliability"):
+        yield f"attractors.{name}", getattr(cognitive_map.attractors, name)
+    if cognitive_map.log_scale is not None:
+        yield "log_scale", cognitive_map.log_scale
+    if cognitive_map.covariance is not None:
+        yield "covariance", cognitive_map.covariance
+
+
+def _require(holds: Array, name: str, complaint: str) -> None:
+    if not holds.all():
+        place = tuple(int(axis) for axis in np.argwhere(~holds)[0])
+        raise FieldError(f"{name}{list(place)} is {complaint}")

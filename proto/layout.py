@@ -1,0 +1,43 @@
+"""Which arrays each message holds: field, type, dimensions. Named dimensions are counts of the Header."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+Layout: TypeAlias = tuple[tuple[str, str, tuple[str | int, ...]], ...]
+
+TEMPLATE_TYPES = {"gradient": "int8", "grey": "uint8"}
+ATTRACTORS: Layout = (
+    ("head_mean_rad", "float32", ("vertices", 2)),
+    ("head_reliability", "float32", ("vertices", 2)),
+    ("grid_period", "float32", ("grid_modules",)),
+    ("grid_mean_rad", "float32", ("vertices", "grid_modules", 2, 2)),
+    ("grid_reliability", "float32", ("vertices", "grid_modules", 2, 2)),
+)
+VERTICES: Layout = (
+    ("t_s", "float64", ("vertices",)),
+    ("poses", "float64", ("vertices", 3)),
+    ("view_cell", "int32", ("vertices",)),
+)
+REFINED_VERTICES: Layout = (
+    ("log_scale", "float64", ("vertices",)),
+    ("covariance", "float64", ("vertices", 3, 3)),
+)
+EDGES: Layout = (
+    ("source", "int32", ("edges",)),
+    ("target", "int32", ("edges",)),
+    ("motion", "float64", ("edges", 3)),
+    ("sigma", "float64", ("edges", 3)),
+    ("kind", "uint8", ("edges",)),
+    ("margin", "float32", ("edges",)),
+)
+VISITS: Layout = (
+    ("t_s", "float64", ("visits",)),
+    ("vertex", "int32", ("visits",)),
+    ("motion", "float64", ("visits", 3)),
+)
+ROAD_MATCH: Layout = (
+    ("lane", "int32", ("vertices",)),
+    ("position_m", "float64", ("vertices",)),
+    ("status", "uint8", ("vertices",)),
+)

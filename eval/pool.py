@@ -1,0 +1,86 @@
+"""Independent tasks over processes, with a progress bar that names the stage. Results come in the order of the tasks."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TypeVar
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from hippodrome.core.types import HippodromeError
+
+TaskT = TypeVar("TaskT")
+ResultT = TypeVar("ResultT")
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """A pool of processes and the progress display that goes with it."""
+
+    executor: ProcessPoolExecutor
+    progress: Progress
+
+    def run(
+        self,
+        stage: str,
+        task: Callable[[TaskT], ResultT],
+        tasks: Sequence[TaskT],
+        weight: Callable[[TaskT], int] = lambda _: 1,
+    ) -> list[ResultT]:
+        """``task`` of each of ``tasks``; the first error stops the stage, and what is already on disk stays there."""
+        bar = self.progress.add_task(stage, total=sum(weight(item) for item in tasks))
+        futures = {self.executor.submit(task, item): weight(item) for item in tasks}
+        try:
+            self._watch(futures, bar)
+            return [future.result() for future in futures]
+        except BrokenProcessPool:
+            raise HippodromeError(
+                f"{stage}: a worker process died (out of memory?); run the same command again to resume, with fewer --workers"
+            ) from None
+        finally:
+            for future in futures:
+                future.cancel()
+
+    def _watch(self, futures: dict[Future[ResultT], int], bar: TaskID) -> None:
+        """Advance the bar as tasks end; polling keeps an interrupt from the keyboard prompt."""
+        pending = set(futures)
+        while pending:
+            done, pending = wait(pending, timeout=0.2, return_when="FIRST_COMPLETED")
+            for future in done:
+                future.result()
+                self.progress.advance(bar, futures[future])
+
+
+@contextmanager
+def worker_pool(workers: int) -> Iterator[Workers]:
+    """``workers`` fresh processes: SUMO and GL keep state that must not be inherited, so they are spawned, not forked."""
+    columns = (
+        TextColumn("{task.description:<10}"),
+        BarColumn(bar_width=40),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    console = Console(stderr=True)
+    executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker)
+    try:
+        with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+            yield Workers(executor, progress)
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)
+
+
+def _quiet_worker() -> None:
+    """One process, one core: the pool is the parallelism. Libraries' banners on standard output do not belong to ours."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    sys.stdout = sys.stderr

@@ -167,9 +167,12 @@ def read_out(state: GridState, near: FloatArray, reach: float = 0.0) -> tuple[Fl
     return position, reliability
 
 
-def population_position(state: GridState, population: int, near: FloatArray, reach: float = 0.0) -> FloatArray:
-    """Position (2,) that one population encodes, nearest to ``near`` (2,)."""
-    return decode(state.mean_rad[:, population], state.reliability[:, population], state.period, near, reach)
+def population_belief(state: GridState, population: int, near: FloatArray, reach: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """Position (2,) that one population encodes, nearest to ``near`` (2,), and its reliability (2,) in 1/length^2."""
+    reliability = state.reliability[:, population]
+    per_length = (TURN / state.period[:, None]) ** 2
+    position = decode(state.mean_rad[:, population], reliability, state.period, near, reach)
+    return position, np.mean(reliability * per_length, axis=0)
 
 
 def decode(mean_rad: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float) -> FloatArray:

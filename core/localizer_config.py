@@ -1,0 +1,77 @@
+"""The localizer's parameters and the two small objects that travel inside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+from hippodrome.core.attractor import AttractorConfig, paper_config
+from hippodrome.core.grid_cells import GRID_INFORMATION
+from hippodrome.core.types import FloatArray
+from hippodrome.core.view_cells import ViewCellConfig
+
+
+@dataclass(frozen=True)
+class MotionNoise:
+    """What the vehicle's self-motion is trusted for; between the named noise levels "paper" and "realistic"."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
+
+    speed: float = 0.03  # relative, white, per square root of a second
+    gyro_rad_per_sqrt_s: float = 0.005  # angle random walk, 0.3 deg per sqrt(s)
+    gyro_gain: float = 0.02  # share of the turned angle
+    scale_prior: float = 0.3  # sigma of ln(metres per unit) of this drive about the map's: two drives' spreads of 0.2
+    scale_walk_per_sqrt_m: float = 0.004  # ln(scale) wanders 4 % in 100 m
+
+
+@dataclass(frozen=True)
+class InjectionNoise:
+    """How well a reactivated view tells the pose; the map's own error is ``map_m`` and cannot be averaged away."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
+
+    along_m: float = 1.2  # best match among views 5 m apart, parabola between them, 0.7 m; consecutive errors correlate
+    across_m: float = 0.8  # two drivers' wander inside a lane, correlated over tens of metres
+    heading_rad: float = 0.05
+    map_m: float = 0.4  # of a refined map, added to the reported covariance
+    gate: float = 12.0  # squared Mahalanobis distance beyond which an injection conflicts (3 dof: 99.3 %)
+
+
+@dataclass(frozen=True)
+class PaperNetworks:
+    """Mode "paper": the printed networks, one torus, strengths and period of public descendants."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
+
+    head: AttractorConfig = field(default_factory=paper_config)
+    grid: AttractorConfig = field(default_factory=lambda: paper_config(GRID_INFORMATION))
+    period_m: float = 150.0
+    strength: float = 0.3  # of E, per injection: the family uses 0.1 to 0.4
+
+
+@dataclass(frozen=True)
+class LocalizerConfig:
+    """Mode "default": attractors with hand-back; "paper": as printed; "kalman": the yardstick, given the same injections."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
+
+    mode: Literal["default", "paper", "kalman"] = "default"
+    views: ViewCellConfig = field(default_factory=ViewCellConfig)
+    motion: MotionNoise = field(default_factory=MotionNoise)
+    injection: InjectionNoise = field(default_factory=InjectionNoise)
+    head: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=1e4))  # sigma 0.01 rad at best
+    grid: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=1e4))  # sigma 0.15 m at best
+    smallest_period_m: float = 97.0  # of the grid modules; half of it must exceed the drift between two injections
+    paper: PaperNetworks = field(default_factory=PaperNetworks)
+    margin: float = 1.2  # filtered margin at which a view cell is reactivated: 87 % right on its own
+    fix_evidence: float = 4.0  # summed margin of agreeing reactivations that makes a fix or overturns one
+    lost_sigma_m: float = 6.0  # "localized" is taken back when the position's standard deviation exceeds this
+    lane_sigma_m: float = 0.5  # of a driver about the lane's centre; 0: no lane pull
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Injection:
+    """A pose that something seen vouches for: ``pose`` (3,), ``covariance`` (3, 3), network frame."""
+
+    pose: FloatArray
+    covariance: FloatArray

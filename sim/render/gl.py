@@ -1,0 +1,18 @@
+"""The one place that imports pyrender and OpenGL, after the settings that both read at import."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+
+os.environ.setdefault("PYOPENGL_PLATFORM", "egl")  # off-screen without a display server; a user's own choice stays
+os.environ.setdefault("LP_NUM_THREADS", "0")  # llvmpipe: parallelism is one process per chunk of the drive, not threads
+if not hasattr(np, "infty"):
+    np.inf = np.inf  # type: ignore[attr-defined]  # pyrender 0.1.45 was written for numpy 1
+
+import OpenGL.GL as gl
+import pyrender
+from OpenGL.GL import shaders
+
+__all__ = ["gl", "pyrender", "shaders"]

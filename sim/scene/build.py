@@ -1,0 +1,60 @@
+"""A town's scene: geometry from the town and a seed alone, then colours for the conditions, cut into tiles."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from hippodrome.core.types import FloatArray, IntArray
+from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.light import colour, extinction_per_m, haze_rgb, light_of, sky_dome
+from hippodrome.sim.scene.mesh import Mesh, merge
+from hippodrome.sim.scene.town_mesh import town_mesh
+from hippodrome.sim.scene.types import Scene, Tile
+from hippodrome.sim.types import Town
+
+TILE_M: Final = 80.0  # small enough to cull well, large enough that a frame needs few draw calls
+
+
+def build_scene(town: Town, seed: int, conditions: Conditions) -> Scene:
+    """The same town and seed give the same geometry under all conditions, and the same bytes under the same ones."""
+    origin_m = np.round(0.5 * (town.network.points_m.min(axis=0) + town.network.points_m.max(axis=0)))
+    bold, fine = town_mesh(town, seed, origin_m)
+    light = light_of(conditions)
+    return Scene(
+        tiles=_tiles(bold, fine, conditions),
+        sky=sky_dome(conditions),
+        origin_m=origin_m,
+        haze_rgb=haze_rgb(conditions),
+        extinction_per_m=extinction_per_m(conditions),
+        light=light,
+    )
+
+
+def _tiles(bold: Mesh, fine: Mesh, conditions: Conditions) -> tuple[Tile, ...]:
+    """Faces grouped by the tile of their centre, bold ones first; each tile with the vertices that it uses."""
+    mesh = merge([bold, fine])
+    rgb = colour(mesh, conditions, light_of(conditions))
+    is_fine = np.arange(len(mesh.faces)) >= len(bold.faces)
+    tile = _tile_of_faces(mesh.vertices_m[mesh.faces].mean(axis=1)[:, :2])
+    order = np.lexsort((is_fine, tile))
+    starts = np.flatnonzero(np.diff(tile[order], prepend=-1))
+    return tuple(_tile(mesh, rgb, rows, is_fine) for rows in np.split(order, starts[1:]))
+
+
+def _tile(mesh: Mesh, rgb: np.ndarray, rows: IntArray, is_fine: np.ndarray) -> Tile:
+    used, faces = np.unique(mesh.faces[rows], return_inverse=True)
+    return Tile(
+        vertices_m=mesh.vertices_m[used],
+        faces=faces.reshape(-1, 3).astype(np.int32),
+        rgb=rgb[used],
+        bold_faces=int(np.count_nonzero(~is_fine[rows])),
+    )
+
+
+def _tile_of_faces(centre_m: FloatArray) -> IntArray:
+    """Number of the tile (m,) that holds each point (m, 2), counted row by row."""
+    cell = np.floor(centre_m / TILE_M).astype(np.int64)
+    cell -= cell.min(axis=0)
+    return (cell[:, 1] * (cell[:, 0].max() + 1) + cell[:, 0]).astype(np.int32)

@@ -8,7 +8,7 @@ import numpy as np
 
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.association import TrajectoryError, check_trajectory
-from hippodrome.eval.atomic import write_text_atomically
+from hippodrome.proto.atomic import write_atomically
 
 MAX_BYTES = 256 << 20  # about two million poses
 COLUMNS = 8
@@ -20,7 +20,7 @@ def write_tum(path: Path, trajectory: Trajectory) -> None:
     half = trajectory.poses[:, 2] / 2.0
     rows = zip(trajectory.t_s, trajectory.poses[:, 0], trajectory.poses[:, 1], np.sin(half), np.cos(half), strict=True)
     lines = [f"{t_s!r} {x!r} {y!r} 0 0 0 {qz!r} {qw!r}" for t_s, x, y, qz, qw in (map(float, row) for row in rows)]
-    write_text_atomically(path, "# t_s x y z qx qy qz qw\n" + "\n".join(lines) + "\n")
+    write_atomically(path, ("# t_s x y z qx qy qz qw\n" + "\n".join(lines) + "\n").encode())
 
 
 def read_tum(path: Path) -> Trajectory:

@@ -12,12 +12,12 @@ from __future__ import annotations
 import os
 import stat
 import struct
-import tempfile
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.proto.atomic import write_atomically
 
 MAGIC = b"\x89HIPPO\r\n"  # high bit and line end, as in PNG: a transfer in text mode breaks it visibly
 COMPRESSION_LEVEL = 9  # fixed: the same map gives the same bytes; a map is written once and read often
@@ -39,7 +39,7 @@ def write_stream(path: Path, version: int, records: Sequence[bytes]) -> int:
     if len(records) > MAX_RECORDS or sum(map(len, records)) > MAX_RAW_BYTES:
         raise PbstreamError(f"{path}: too large to be read back: at most {MAX_RECORDS} records, {MAX_RAW_BYTES >> 20} MiB in all")
     data = stream_bytes(version, records)
-    _write_atomically(path, data)
+    write_atomically(path, data)
     return len(data)
 
 
@@ -132,30 +132,3 @@ def _u32(path: Path, data: bytes, place: int, what: str) -> int:
         raise PbstreamError(f"{path}: byte {len(data)}: truncated inside {what}")
     (value,) = _U32.unpack_from(data, place)
     return int(value)
-
-
-def _write_atomically(path: Path, data: bytes) -> None:
-    temporary = None
-    try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False) as file:
-            temporary = Path(file.name)
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.chmod(0o644)  # a temporary file is private by default; a result is for reading
-        temporary.replace(path)
-        _sync_folder(path.parent)
-    except OSError as error:
-        raise PbstreamError(f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Make the rename itself durable."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

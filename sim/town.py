@@ -1,0 +1,234 @@
+"""Towns: generated from a seed with netgenerate and netconvert, or any SUMO network, OpenStreetMap or OpenDRIVE file."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import re
+import subprocess
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from itertools import product
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+import sumo
+from pydantic import Field
+
+from hippodrome.core.types import FloatArray, HippodromeError
+from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
+from hippodrome.sim.network import SumoNet, check_network, is_left_hand, load_net, road_network
+from hippodrome.sim.rural import rural_plan
+from hippodrome.sim.spec import Spec
+from hippodrome.sim.types import Town
+
+TOOL_TIMEOUT_S: Final = 120.0  # netconvert takes 0.1 s for a generated town and some 10 s for a city
+LANE_WIDTH_M: Final = 3.2  # SUMO's default
+POLE_SETBACK_M: Final = 0.8  # signal poles stand this far outside the carriageway
+MIN_RING_M: Final = 40.0  # a narrower ring leaves no room for houses between the streets
+
+CROSSING_RADIUS_M: Final = 6.0  # kerb radius, so that a right turn follows 7.6 m rather than SUMO's 5.6 m
+THROUGH_RADIUS_M: Final = 0.0  # where a road merely goes on under another number, no room for turning is needed
+CONVERT_OPTIONS: Final = (
+    "--no-turnarounds.except-deadend=true",  # nobody turns round in the middle of a street
+    "--junctions.limit-turn-speed=2.5",  # m/s^2, what passengers accept
+    "--junctions.internal-link-detail=10",
+    "--junctions.corner-detail=5",
+    "--offset.disable-normalization=true",
+    "--no-warnings=true",
+)
+CONVERTIBLE: Final = {".osm": "--osm-files", ".xodr": "--opendrive-files"}
+
+
+class TownSpec(Spec):
+    """Which town to build. The defaults are CARLA Town07 as SUMO sees it: 4.39 km of directed roads in 287 m by 370 m."""
+
+    kind: Literal["rural", "grid", "radial", "random"] = "rural"
+    width_m: float = Field(287.0, ge=100.0, le=20_000.0)
+    height_m: float = Field(370.0, ge=100.0, le=20_000.0)
+    road_km: float = Field(4.39, ge=0.8, le=500.0)  # directed: a two-way street counts twice
+    lanes: int = Field(1, ge=1, le=2)  # per direction
+    speed_limit_mps: float = Field(8.33, ge=3.0, le=40.0)
+    network: Path | None = None  # a .net.xml, .net.xml.gz, .osm or .xodr; overrides everything above
+
+
+def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
+    """The town of a scenario. What is generated lies below ``work_dir``, named by its content's recipe, and is made once."""
+    if spec.network is not None:
+        return read_town(_imported(spec.network, work_dir))
+    recipe = f"{spec.model_dump_json()} {rng_seed} {CONVERT_OPTIONS} {CROSSING_RADIUS_M} {THROUGH_RADIUS_M}"
+    net_file = work_dir / f"{spec.kind}-{hashlib.sha256(recipe.encode()).hexdigest()[:12]}.net.xml"
+    if not net_file.exists():
+        _write_plan_as_net(_plan(spec, rng_seed), spec, net_file)
+    return read_town(net_file, name=spec.kind)
+
+
+def read_town(net_file: Path, name: str | None = None) -> Town:
+    """A town from a SUMO network file, checked."""
+    net = load_net(net_file)
+    network = road_network(net, net_file)
+    left_hand = is_left_hand(net_file)
+    return Town(
+        name=name or net_file.name.split(".")[0],
+        net_file=net_file,
+        network=network,
+        junction_polygons_m=_junction_polygons(net),
+        signals_m=_signals(net, left_hand),
+        left_hand=left_hand,
+        notes=check_network(net, network, net_file),
+    )
+
+
+def sumo_binary(name: str) -> str:
+    """Path of one of the programs in the ``eclipse-sumo`` package."""
+    binary = Path(sumo.SUMO_HOME) / "bin" / (f"{name}.exe" if os.name == "nt" else name)
+    if not binary.is_file():
+        raise HippodromeError(f"{binary}: program missing; reinstall the Python package eclipse-sumo")
+    return str(binary)
+
+
+def run_tool(name: str, *options: str) -> None:
+    """Runs one of SUMO's programs; its complaint becomes the error."""
+    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
+    command = [sumo_binary(name), *options]
+    try:
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=TOOL_TIMEOUT_S, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise HippodromeError(f"{name}: no answer within {TOOL_TIMEOUT_S:.0f} s; make the network smaller") from error
+    if done.returncode != 0:
+        raise HippodromeError(f"{name} failed ({done.returncode}): {' '.join(done.stderr.split())[:500]}")
+
+
+def _plan(spec: TownSpec, rng_seed: int) -> Plan:
+    """The plan whose two-way streets come closest to the wanted length; every size is drawn from the same seed."""
+    width, height, length = spec.width_m, spec.height_m, 500.0 * spec.road_km
+    if spec.kind == "rural":
+        percent = range(100, 141, 8)  # of the wanted length: crossings take away from the streets
+        return closest_plan(lambda size: rural_plan(width, height, 0.01 * size * length, _rng(rng_seed)), percent, length)
+    if spec.kind == "grid":
+        blocks = round(length**2 / (4.0 * width * height))  # of n x n blocks with side a: length 2 n (n + 1) a
+        return closest_plan(
+            lambda size: grid_plan(width, height, size, _rng(rng_seed)), range(max(1, blocks // 2), 2 * blocks + 2), length
+        )
+    if spec.kind == "radial":
+        rings = range(1, max(2, int(min(width, height) / 2.0 / MIN_RING_M)) + 1)
+        layouts = list(product(rings, range(4, 13)))
+        return closest_plan(lambda i: radial_plan(width, height, *layouts[i], _rng(rng_seed)), range(len(layouts)), length)
+    # Streets that fill the box with the wanted length are about 1.4 area / length long (planar pattern of mean degree 3).
+    street_m = 1.4 * width * height / length
+    sizes = [round(share * length / street_m) for share in np.linspace(0.8, 2.0, 9)]
+    return closest_plan(lambda size: _random_plan(street_m, size, rng_seed), sizes, length)
+
+
+def _rng(seed: int) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def _random_plan(street_m: float, size: int, seed: int) -> Plan:
+    """netgenerate's random network of about ``size`` streets, without its dead ends."""
+    with tempfile.TemporaryDirectory() as folder:
+        prefix = Path(folder) / "random"
+        run_tool(
+            "netgenerate", "--rand", f"--rand.iterations={size}", f"--seed={seed % 2**31}",
+            f"--rand.min-distance={0.7 * street_m:.2f}", f"--rand.max-distance={1.6 * street_m:.2f}",
+            "--rand.min-angle=50", "--rand.connectivity=0.95", "--no-warnings", f"--plain-output-prefix={prefix}",
+        )  # fmt: skip
+        return without_dead_ends(_read_plain(Path(f"{prefix}.nod.xml"), Path(f"{prefix}.edg.xml")))
+
+
+def _read_plain(nodes_file: Path, edges_file: Path) -> Plan:
+    """A plan from SUMO's plain XML; both directions of a street become one."""
+    nodes = list(ElementTree.parse(nodes_file).getroot().iter("node"))
+    number = {node.attrib["id"]: i for i, node in enumerate(nodes)}
+    points = np.array([[float(node.attrib["x"]), float(node.attrib["y"])] for node in nodes])
+    edges = ElementTree.parse(edges_file).getroot().iter("edge")
+    ends = {(number[edge.attrib["from"]], number[edge.attrib["to"]]) for edge in edges}
+    streets = tuple(sorted({(min(pair), max(pair)) for pair in ends}))
+    return Plan(points, streets, tuple(points[list(street)] for street in streets))
+
+
+def _write_plan_as_net(plan: Plan, spec: TownSpec, net_file: Path) -> None:
+    """netconvert's network of a plan, atomically, and without its comments, which hold the date."""
+    net_file.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=net_file.parent) as folder:
+        nodes, edges, net = (Path(folder) / name for name in ("town.nod.xml", "town.edg.xml", "town.net.xml"))
+        nodes.write_text(_nodes_xml(plan), encoding="utf-8")
+        edges.write_text(_edges_xml(plan, spec), encoding="utf-8")
+        run_tool("netconvert", f"--node-files={nodes}", f"--edge-files={edges}", f"--output-file={net}", *CONVERT_OPTIONS)
+        _strip_comments(net)
+        net.replace(net_file)
+
+
+def _nodes_xml(plan: Plan) -> str:
+    radii = [THROUGH_RADIUS_M if through else CROSSING_RADIUS_M for through in through_nodes(plan)]
+    rows = (
+        f'<node id="{i}" x="{x:.2f}" y="{y:.2f}" type="priority" radius="{radius}"/>'
+        for i, ((x, y), radius) in enumerate(zip(plan.nodes_m, radii, strict=True))
+    )
+    return "\n".join(["<nodes>", *rows, "</nodes>", ""])
+
+
+def _edges_xml(plan: Plan, spec: TownSpec) -> str:
+    """Each street as two edges, ``a-b`` and ``b-a``, so that a name tells where it leads."""
+    common = f'numLanes="{spec.lanes}" speed="{spec.speed_limit_mps:.2f}" width="{LANE_WIDTH_M}" spreadType="right"'
+    rows = [
+        f'<edge id="{a}-{b}" from="{a}" to="{b}" {common} shape="{_shape_text(points)}"/>'
+        for (u, v), shape in zip(plan.streets, plan.shapes_m, strict=True)
+        for a, b, points in ((u, v, shape), (v, u, shape[::-1]))
+    ]
+    return "\n".join(["<edges>", *rows, "</edges>", ""])
+
+
+def _shape_text(points_m: FloatArray) -> str:
+    return " ".join(f"{x:.2f},{y:.2f}" for x, y in points_m)
+
+
+def _strip_comments(file: Path) -> None:
+    text = file.read_text(encoding="utf-8")
+    file.write_text(re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL), encoding="utf-8")
+
+
+def _imported(source: Path, work_dir: Path) -> Path:
+    """A SUMO network as it is; OpenStreetMap and OpenDRIVE maps converted once into ``work_dir``."""
+    option = CONVERTIBLE.get(source.suffix)
+    if option is None:
+        return source
+    if not source.is_file():
+        raise HippodromeError(f"{source}: no such map file; give a .net.xml, .net.xml.gz, .osm or .xodr")
+    digest = hashlib.sha256(source.read_bytes()).hexdigest()[:12]
+    net_file = work_dir / f"{source.stem}-{digest}.net.xml"
+    if not net_file.exists():
+        work_dir.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=work_dir) as folder:
+            net = Path(folder) / "map.net.xml"
+            run_tool("netconvert", f"{option}={source}", f"--output-file={net}", "--no-warnings=true")
+            _strip_comments(net)
+            net.replace(net_file)
+    return net_file
+
+
+def _junction_polygons(net: SumoNet) -> tuple[FloatArray, ...]:
+    """Paved outlines of the junctions that cars pass."""
+    shapes = [node.getShape() for node in net.getNodes() if any(edge.allows("passenger") for edge in node.getIncoming())]
+    return tuple(np.array(shape, dtype=np.float64)[:, :2] for shape in shapes if len(shape) >= 3)
+
+
+def _signals(net: SumoNet, left_hand: bool) -> FloatArray:
+    """Where approaches end at a traffic light or have to give way: (K, 3) pole position and driving direction."""
+    rows = []
+    for edge in net.getEdges(withInternal=False):
+        links = [link for links in edge.getOutgoing().values() for link in links if link.allows("passenger")]
+        controlled = any(link.getTLSID() for link in links)
+        gives_way = len(links) > 1 and all(link.getState() in "mswz=" for link in links)
+        if edge.allows("passenger") and (controlled or gives_way):
+            rows.append(_beside_stop_line(edge.getLanes()[0], left_hand))
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+
+def _beside_stop_line(lane: SumoNet, left_hand: bool) -> tuple[float, float, float]:
+    (x0, y0), (x1, y1) = lane.getShape()[-2:]
+    heading = math.atan2(y1 - y0, x1 - x0)
+    aside = (0.5 * lane.getWidth() + POLE_SETBACK_M) * (1.0 if left_hand else -1.0)
+    return x1 - aside * math.sin(heading), y1 + aside * math.cos(heading), heading

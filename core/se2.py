@@ -44,3 +44,10 @@ def integrate(start: FloatArray, motions: FloatArray) -> FloatArray:
     x = start[0] + np.cumsum(cos * motions[:, 0] - sin * motions[:, 1])
     y = start[1] + np.cumsum(sin * motions[:, 0] + cos * motions[:, 1])
     return np.stack([x, y, wrap(heading)], axis=-1)
+
+
+def interpolate(t_s: FloatArray, poses: FloatArray, at_s: FloatArray) -> FloatArray:
+    """Poses (M, 3) at the times ``at_s`` (M,), linear between poses (N, 3) at ``t_s`` (N,); headings along the shorter arc."""
+    x, y = (np.interp(at_s, t_s, poses[:, axis]) for axis in (0, 1))
+    heading = np.interp(at_s, t_s, np.unwrap(poses[:, 2]))
+    return np.stack([x, y, wrap(heading)], axis=-1)

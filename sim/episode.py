@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hippodrome.core.road_network import RoadNetwork
-from hippodrome.core.se2 import wrap
+from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import FloatArray, Frame, GroundTruth, IntArray, Observation, Step
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.render.renderer import FrameRenderer
@@ -62,19 +62,12 @@ def sample_drive(drive: Drive, network: RoadNetwork, motion: SelfMotion, camera_
         speed=motion.speed,
         yaw_rate_radps=motion.yaw_rate_radps,
         frame=frame.astype(np.int32),
-        poses_m=poses_at(drive, motion.t_s),
+        poses_m=interpolate(drive.t_s, drive.poses_m, motion.t_s),
         speed_mps=np.interp(motion.t_s, drive.t_s, drive.speed_mps),
         lane=drive.lane[nearest],
         lane_position_m=drive.lane_position_m[nearest],
         lane_ids=network.lane_ids,
     )
-
-
-def poses_at(drive: Drive, t_s: FloatArray) -> FloatArray:
-    """Poses (N, 3) between the drive's samples, headings along the shorter arc."""
-    x, y = (np.interp(t_s, drive.t_s, drive.poses_m[:, axis]) for axis in (0, 1))
-    heading = np.interp(t_s, drive.t_s, np.unwrap(drive.poses_m[:, 2]))
-    return np.stack([x, y, wrap(heading)], axis=-1)
 
 
 def draw_frame(

@@ -40,12 +40,12 @@ class AttractorPose:
     config: LocalizerConfig
 
     @classmethod
-    def uniform(cls, log_scale: float, config: LocalizerConfig) -> Self:
-        """No prior knowledge but the map's scale."""
+    def uniform(cls, start_m: FloatArray, log_scale: float, config: LocalizerConfig) -> Self:
+        """No prior knowledge but the map's scale; ``start_m`` (2,) only serves as a place to count sheets from."""
         return cls(
             head=head_direction.uniform(config.head),
             grid=grid_cells.uniform(grid_cells.module_periods(config.smallest_period_m), config.grid),
-            position_m=np.zeros((2, 2)),
+            position_m=np.tile(start_m, (2, 1)),
             log_scale=log_scale,
             sq_sigma_scale=config.motion.scale_prior**2,
             coupling_scale=np.zeros(2),

@@ -7,8 +7,10 @@ from typing import Any, ClassVar, Literal
 
 from hippodrome.core.attractor import AttractorConfig, paper_config
 from hippodrome.core.grid_cells import GRID_INFORMATION
+from hippodrome.core.sequence_filter import SequenceConfig
 from hippodrome.core.types import FloatArray
 from hippodrome.core.view_cells import ViewCellConfig
+from hippodrome.core.view_step import ViewStepConfig
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,8 @@ class LocalizerConfig:
 
     mode: Literal["default", "paper", "kalman"] = "default"
     views: ViewCellConfig = field(default_factory=ViewCellConfig)
+    steps: ViewStepConfig = field(default_factory=ViewStepConfig)
+    sequence: SequenceConfig = field(default_factory=SequenceConfig)
     motion: MotionNoise = field(default_factory=MotionNoise)
     injection: InjectionNoise = field(default_factory=InjectionNoise)
     head: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=1e4))  # sigma 0.01 rad at best
@@ -65,8 +69,12 @@ class LocalizerConfig:
     paper: PaperNetworks = field(default_factory=PaperNetworks)
     margin: float = 1.2  # filtered margin at which a view cell is reactivated: 87 % right on its own
     fix_evidence: float = 4.0  # summed margin of agreeing reactivations that makes a fix or overturns one
+    doubt_evidence: float = 2.0  # of a challenger, at which "localized" is taken back
+    evidence_limit: float = 8.0  # of the incumbent
     lost_sigma_m: float = 6.0  # "localized" is taken back when the position's standard deviation exceeds this
     lane_sigma_m: float = 0.5  # of a driver about the lane's centre; 0: no lane pull
+    step_tolerance_m: float = 3.5  # of a look's travel along the map: scale and spacing differ between drives
+    mean_trust: int = 16  # views that the map's mean descriptor counts for in the query's running mean
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -33,11 +33,11 @@ class KalmanPose:
     config: LocalizerConfig
 
     @classmethod
-    def uniform(cls, log_scale: float, config: LocalizerConfig) -> Self:
-        """No prior knowledge but the map's scale."""
+    def uniform(cls, start_m: FloatArray, log_scale: float, config: LocalizerConfig) -> Self:
+        """No prior knowledge but the map's scale; ``start_m`` (2,) is the mean of a flat belief."""
         covariance = np.zeros((4, 4))
         covariance[:3, :3], covariance[3, 3] = UNKNOWN, config.motion.scale_prior**2
-        return cls(Gaussian(np.array([0.0, 0.0, 0.0, log_scale]), covariance), None, config)
+        return cls(Gaussian(np.array([start_m[0], start_m[1], 0.0, log_scale]), covariance), None, config)
 
     @property
     def pose(self) -> FloatArray:
@@ -47,7 +47,7 @@ class KalmanPose:
     @property
     def covariance(self) -> FloatArray:
         """(3, 3) of ``pose``."""
-        return self.incumbent.covariance[:3, :3]
+        return self.incumbent.covariance[:3, :3].copy()
 
     @property
     def challenged(self) -> bool:

@@ -1,0 +1,176 @@
+"""Visual localization in a topometric map from an unknown start, III.C of Li et al. 2025.
+
+Per observation: path integration moves the networks. Per look, once the view has changed enough: the frame is scored against
+all view cells, the scores are filtered along the paths of the map, and a cell that stands out is reactivated. Its pose is
+injected where it agrees with the belief; where it does not, it becomes a challenger that has to win by further evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TypeAlias
+
+import numpy as np
+
+from hippodrome.core import localizer_places, view_cells, view_step
+from hippodrome.core.localizer_attractor import AttractorPose
+from hippodrome.core.localizer_config import Injection, LocalizerConfig
+from hippodrome.core.localizer_kalman import KalmanPose
+from hippodrome.core.localizer_paper import PaperPose
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.sequence_filter import standardise
+from hippodrome.core.types import (
+    CognitiveMap,
+    Float32Array,
+    FloatArray,
+    Frame,
+    HippodromeError,
+    LocalizationEstimate,
+    Observation,
+)
+
+__all__ = ["Localizer", "LocalizerConfig", "localize"]
+
+PoseBelief: TypeAlias = AttractorPose | KalmanPose | PaperPose
+
+
+def localize(
+    observations: Iterable[Observation], cognitive_map: CognitiveMap, network: RoadNetwork | None, config: LocalizerConfig
+) -> list[LocalizationEstimate]:
+    """Localize a whole drive from an unknown start."""
+    localizer = Localizer(cognitive_map, network, config)
+    return [localizer.step(observation) for observation in observations]
+
+
+class Localizer:
+    """Feed it observations in order; each ``step`` answers with the pose so far."""
+
+    def __init__(self, cognitive_map: CognitiveMap, network: RoadNetwork | None, config: LocalizerConfig) -> None:
+        if cognitive_map.frame != "network" or len(cognitive_map.poses) == 0:
+            raise HippodromeError(
+                f"localization needs a map in the network frame with vertices, got frame {cognitive_map.frame!r} with "
+                f"{len(cognitive_map.poses)} vertices: refine the map first"
+            )
+        self._config = config
+        self._places = localizer_places.places_of(cognitive_map, network, config.lane_sigma_m, config.injection.map_m)
+        self._belief = _unknown(cognitive_map, config)
+        self._filtered: Float32Array = np.zeros(len(self._places.poses_m), dtype=np.float32)
+        self._query_mean = view_cells.start_query_mean(self._places.bank.mean, config.mean_trust)
+        self._view_step = view_step.start()
+        self._step_m, self._turned_rad = 0.0, 0.0  # since the last look
+        self._evidence = 0.0  # for the incumbent; 0: no fix
+        self._challenge = 0.0  # for the challenger
+        self._margin, self._cell = 0.0, -1
+
+    def step(self, observation: Observation) -> LocalizationEstimate:
+        """Take one observation in."""
+        self._move(observation)
+        if observation.frame is not None and (self._cell < 0 or view_step.is_due(self._view_step, self._config.steps)):
+            self._look(observation.frame)
+        return self._estimate(observation.t_s)
+
+    def _move(self, observation: Observation) -> None:
+        travelled, turned_rad = observation.speed * observation.dt_s, observation.yaw_rate_radps * observation.dt_s
+        self._view_step = view_step.advance(self._view_step, observation, self._config.steps)
+        self._belief = self._belief.predict(travelled, turned_rad, observation.dt_s)
+        self._step_m += travelled * float(np.exp(_log_scale(self._belief)))
+        self._turned_rad += turned_rad
+
+    def _look(self, frame: Frame) -> None:
+        config, places = self._config, self._places
+        descriptor = view_cells.describe(frame, config.views)
+        self._query_mean = view_cells.update_query_mean(self._query_mean, descriptor, config.views)
+        scores = view_cells.score(places.bank, descriptor, self._query_mean, config.views)
+        similarity, _ = view_cells.best_over_shifts(scores, config.views.max_shift)
+        self._filtered = self._filter(similarity)
+        self._cell = int(np.argmax(self._filtered))
+        self._margin = localizer_places.margin(places, self._filtered, self._cell)
+        self._view_step = view_step.restart(self._view_step)
+        self._step_m, self._turned_rad = 0.0, 0.0
+        if self._margin >= config.margin and places.usable[self._cell]:
+            self._reactivate(self._injection(similarity))
+
+    def _filter(self, similarity: Float32Array) -> Float32Array:
+        sequence, places = self._config.sequence, self._places
+        floor = sequence.sigma_floor if places.bank.kind == "gradient" else sequence.grey_sigma_floor
+        filtered: Float32Array = localizer_places.propagate(
+            self._filtered,
+            standardise(similarity, sequence.min_cells, floor),
+            (places.link_start, places.link_from, places.link_length_m, places.link_turn_rad),
+            (self._step_m, self._turned_rad),
+            (self._config.step_tolerance_m, sequence.turn_tolerance_rad),
+            np.float32(sequence.memory),
+        )
+        return filtered
+
+    def _injection(self, similarity: Float32Array) -> Injection:
+        noise = self._config.injection
+        pose = localizer_places.interpolated_pose(self._places, similarity, self._cell)
+        cos, sin = np.cos(pose[2]), np.sin(pose[2])
+        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        return Injection(pose, turn @ np.diag([noise.along_m**2, noise.across_m**2, noise.heading_rad**2]) @ turn.T)
+
+    def _reactivate(self, injection: Injection) -> None:
+        """Agreement strengthens the incumbent, or the challenger until it wins; anything else starts a new challenge."""
+        config, belief, gate = self._config, self._belief, self._config.injection.gate
+        if isinstance(belief, PaperPose) or (self._evidence > 0.0 and belief.sq_distance(injection) <= gate):
+            self._belief = belief.inject(injection)
+            self._evidence, self._challenge = min(self._evidence + self._margin, config.evidence_limit), 0.0
+        elif belief.challenged and belief.sq_distance(injection, challenger=True) <= gate:
+            self._belief = belief.reinforce(injection)
+            self._challenge += self._margin
+            if self._challenge >= config.fix_evidence:
+                self._belief, self._evidence, self._challenge = self._belief.adopt(), self._challenge, 0.0
+        else:
+            self._belief, self._challenge = belief.challenge(injection), self._margin
+
+    def _estimate(self, t_s: float) -> LocalizationEstimate:
+        belief, config = self._belief, self._config
+        covariance = belief.covariance
+        sigma_m = float(np.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])))
+        doubted = self._challenge >= config.doubt_evidence
+        covariance[0, 0] += config.injection.map_m**2
+        covariance[1, 1] += config.injection.map_m**2
+        return LocalizationEstimate(
+            t_s=t_s,
+            pose=belief.pose,
+            covariance=covariance,
+            localized=self._evidence > 0.0 and sigma_m < config.lost_sigma_m and not doubted,
+            confidence=self._margin,
+            view_cell=self._cell,
+            **_activity(belief),
+        )
+
+
+def _unknown(cognitive_map: CognitiveMap, config: LocalizerConfig) -> PoseBelief:
+    """Belief before the first observation: anywhere in the map, self-motion scaled as in the mapping drive."""
+    log_scale = 0.0 if cognitive_map.log_scale is None else float(np.median(cognitive_map.log_scale))
+    centre_m = np.mean(cognitive_map.poses[:, :2], axis=0)
+    if config.mode == "paper":
+        return PaperPose.uniform(centre_m, log_scale, config)
+    if config.mode == "kalman":
+        return KalmanPose.uniform(centre_m, log_scale, config)
+    return AttractorPose.uniform(centre_m, log_scale, config)
+
+
+def _log_scale(belief: PoseBelief) -> float:
+    return float(belief.incumbent.mean[3]) if isinstance(belief, KalmanPose) else belief.log_scale
+
+
+def _activity(belief: PoseBelief) -> dict[str, FloatArray]:
+    """State of the networks; the Kalman filter has none."""
+    if isinstance(belief, KalmanPose):
+        heading_rad, sq_heading = belief.pose[2], belief.covariance[2, 2]
+        none = np.zeros((0, 2, 2))
+        return {
+            "head_direction_rad": np.full(2, heading_rad),
+            "head_reliability": np.array([1.0 / sq_heading, 0.0]),
+            "grid_phase_rad": none,
+            "grid_reliability": none,
+        }
+    return {
+        "head_direction_rad": belief.head.mean_rad,
+        "head_reliability": belief.head.reliability,
+        "grid_phase_rad": belief.grid.mean_rad,
+        "grid_reliability": belief.grid.reliability,
+    }

@@ -1,0 +1,162 @@
+"""Places of a topometric map, laid out for recognition: where each view cell was seen, and which cells lead to which.
+
+Cells are linked by geometry, not by the mapping drive's order: a turn that the mapping drive never took, from one mapped
+street into another, is a path all the same.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from hippodrome.core import road_geometry, se2
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.types import CognitiveMap, Float32Array, FloatArray, IntArray, MatchStatus
+from hippodrome.core.view_cells import ViewCellBank, bank_of
+
+LINK_REACH_M = 15.0  # longest step between two looks; at 30 km/h they are 5 m apart
+LINK_BEND_RAD = 0.35  # the chord of a link points half its turn ahead, within this
+LINK_TURN_RAD = 1.2  # no vehicle turns more within one link
+SAME_PLACE_M = 15.0  # cells closer than this show the same place and are no rivals
+SAME_WAY_RAD = math.radians(30.0)  # lanes and cells that lead the same way
+LANE_REACH_M = 5.0  # a second lane of the same way within this: which one is driven is unknown
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """C view cells with metric poses. ``link_*`` in CSR form: cell ``j`` is reached from ``link_from[start[j]:start[j + 1]]``."""
+
+    bank: ViewCellBank
+    poses_m: FloatArray  # (C, 3)
+    usable: NDArray[np.bool_]  # (C,) the refinement vouches for the pose
+    before: IntArray  # (C,) cell of the visit before, -1: none near
+    after: IntArray  # (C,)
+    link_start: IntArray  # (C + 1,)
+    link_from: IntArray  # (K,)
+    link_length_m: FloatArray  # (K,)
+    link_turn_rad: FloatArray  # (K,)
+
+
+def places_of(cognitive_map: CognitiveMap, network: RoadNetwork | None, lane_sigma_m: float, map_sigma_m: float) -> Places:
+    """The places of a topometric map; its poses are drawn to the lane's centre where a single lane fits."""
+    cells = len(cognitive_map.view_cells.templates)
+    vertex = _first_vertex(cognitive_map.view_cell, cells)
+    poses = cognitive_map.poses[vertex]
+    if network is not None and lane_sigma_m > 0.0:
+        poses = centred(poses, network, map_sigma_m**2 / (map_sigma_m**2 + lane_sigma_m**2))
+    match = cognitive_map.road_match
+    usable = np.ones(cells, dtype=np.bool_) if match is None else match.status[vertex] == MatchStatus.MATCHED
+    before, after = _neighbours(vertex, cognitive_map, poses)
+    return Places(bank_of(cognitive_map.view_cells), poses, usable, before, after, *_links(poses))
+
+
+def _first_vertex(view_cell: IntArray, cells: int) -> IntArray:
+    """Vertex (C,) at which each cell's template was taken: the first that has the cell."""
+    vertex = np.zeros(cells, dtype=np.int32)
+    vertex[view_cell[::-1]] = np.arange(len(view_cell) - 1, -1, -1)
+    return vertex
+
+
+def _neighbours(vertex: IntArray, cognitive_map: CognitiveMap, poses: FloatArray) -> tuple[IntArray, IntArray]:
+    """Cells of the vertices before and after each cell's own, where they are near and face the same way."""
+    around = []
+    for step in (-1, 1):
+        other = vertex + step
+        inside = (other >= 0) & (other < len(cognitive_map.view_cell))
+        cell = cognitive_map.view_cell[np.where(inside, other, 0)]
+        gap = se2.between(poses, poses[cell])
+        near = (np.hypot(gap[:, 0], gap[:, 1]) < LINK_REACH_M) & (step * gap[:, 0] > 0.0) & (np.abs(gap[:, 2]) < LINK_TURN_RAD)
+        around.append(np.where(inside & near, cell, -1).astype(np.int32))
+    return around[0], around[1]
+
+
+def _links(poses: FloatArray) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Pairs of cells that one step of driving connects, a cell and itself included (a step shorter than the spacing)."""
+    pairs = cKDTree(poses[:, :2]).query_pairs(LINK_REACH_M, output_type="ndarray")
+    own = np.arange(len(poses))
+    source = np.concatenate([pairs[:, 0], pairs[:, 1], own])
+    target = np.concatenate([pairs[:, 1], pairs[:, 0], own])
+    gap = se2.between(poses[source], poses[target])
+    length = np.hypot(gap[:, 0], gap[:, 1])
+    bend = np.abs(se2.wrap(np.arctan2(gap[:, 1], gap[:, 0]) - 0.5 * gap[:, 2]))
+    beside = np.abs(gap[:, 1]) < 1.0  # two visits of one place: no step between them, the bearing means nothing
+    possible = (np.abs(gap[:, 2]) < LINK_TURN_RAD) & ((bend < LINK_BEND_RAD) | ((length < 2.0) & beside))
+    source, target, length, turn = source[possible], target[possible], length[possible], gap[possible, 2]
+    order = np.lexsort((source, target))
+    start = np.searchsorted(target[order], np.arange(len(poses) + 1))
+    return start.astype(np.int32), source[order].astype(np.int32), length[order], turn[order]
+
+
+@njit(cache=True)
+def propagate(
+    before: Float32Array,
+    z: Float32Array,
+    links: tuple[IntArray, IntArray, FloatArray, FloatArray],
+    step: tuple[float, float],
+    tolerance: tuple[float, float],
+    memory: np.float32,
+) -> Float32Array:
+    """Sequence evidence (C,): F_t(j) = (1 - memory) z_t(j) + memory max(0, max F_{t-1}(i) over the i that lead to j).
+
+    ``step`` and ``tolerance``: length in m and turn in rad, of the motion since the last look.
+    """
+    start, source, length, turn = links
+    filtered = np.empty_like(z)
+    for j in range(len(z)):
+        best = np.float32(0.0)
+        for k in range(start[j], start[j + 1]):
+            fits = abs(length[k] - step[0]) <= tolerance[0] and abs(turn[k] - step[1]) <= tolerance[1]
+            if fits and before[source[k]] > best:
+                best = before[source[k]]
+        filtered[j] = (np.float32(1.0) - memory) * z[j] + memory * best
+    return filtered
+
+
+def margin(places: Places, filtered: Float32Array, best: int) -> float:
+    """How far the best cell stands out from the best one elsewhere; 0 when there is no elsewhere."""
+    gap = places.poses_m[:, :2] - places.poses_m[best, :2]
+    elsewhere = gap[:, 0] ** 2 + gap[:, 1] ** 2 > SAME_PLACE_M**2
+    return float(filtered[best] - filtered[elsewhere].max()) if elsewhere.any() else 0.0
+
+
+def interpolated_pose(places: Places, similarity: Float32Array, cell: int) -> FloatArray:
+    """Pose (3,) between views: the peak of the parabola through the similarity of a cell and its two neighbours."""
+    before, after = places.before[cell], places.after[cell]
+    own: FloatArray = places.poses_m[cell]
+    if before < 0 or after < 0:
+        return own
+    back_m = math.dist(own[:2], places.poses_m[before, :2])
+    ahead_m = math.dist(own[:2], places.poses_m[after, :2])
+    fall_back = float(similarity[cell] - similarity[before])
+    fall_ahead = float(similarity[cell] - similarity[after])
+    along_m = peak_offset(back_m, ahead_m, fall_back, fall_ahead)
+    other, share = (after, along_m / ahead_m) if along_m > 0.0 else (before, -along_m / back_m)
+    gap = places.poses_m[other] - own
+    gap[2] = se2.wrap(gap[2])
+    between: FloatArray = own + share * gap
+    return between
+
+
+def peak_offset(back_m: float, ahead_m: float, fall_back: float, fall_ahead: float) -> float:
+    """Where the parabola through (-back_m, -fall_back), (0, 0), (ahead_m, -fall_ahead) peaks, at most half way to a neighbour."""
+    curvature = (fall_ahead * back_m + fall_back * ahead_m) / (back_m * ahead_m * (back_m + ahead_m))
+    if curvature <= 0.0:
+        return 0.0
+    slope = (fall_back * ahead_m**2 - fall_ahead * back_m**2) / (back_m * ahead_m * (back_m + ahead_m))
+    return min(max(0.5 * slope / curvature, -0.5 * back_m), 0.5 * ahead_m)
+
+
+def centred(poses_m: FloatArray, network: RoadNetwork, share: float) -> FloatArray:
+    """Poses drawn sideways by ``share`` of the way to the lane's centre, where exactly one lane of their way is near."""
+    lanes = road_geometry.project(road_geometry.road_geometry(network), poses_m[:, :2], LANE_REACH_M)
+    same_way = np.abs(se2.wrap(lanes.heading_rad - poses_m[lanes.point, 2])) < SAME_WAY_RAD
+    fits = np.bincount(lanes.point[same_way], minlength=len(poses_m)) == 1
+    row = np.flatnonzero(same_way & fits[lanes.point])
+    pulled = poses_m.copy()
+    pulled[lanes.point[row], :2] += share * (lanes.foot_m[row] - poses_m[lanes.point[row], :2])
+    return pulled

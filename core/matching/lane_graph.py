@@ -1,0 +1,148 @@
+"""The directed lane graph cut into bins of about 1 m, with tables of what lies ahead of every bin.
+
+Distances are the true arc lengths between bin centres, so that a lane of 0.1 m (common in converted CARLA towns) costs 0.1 m
+and a long one does not gather rounding errors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.types import Float32Array, FloatArray, IntArray, UInt8Array
+
+_CHORD_M = 1.5  # half the chord that a bin's heading is taken over: SUMO's curves are polylines with joints 1-5 m apart
+_MAX_STACK = 4096  # open branches while walking ahead of one bin; a junction of 6 roads x 3 lanes stays below 100
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaneGraph:
+    """N bins. Row ``i`` of the reach tables is ``reach_start[i]:reach_start[i + 1]``, nearest target first."""
+
+    lane: IntArray  # (N,)
+    position_m: FloatArray  # (N,) arc length of the bin's centre on its lane
+    points_m: FloatArray  # (N, 2)
+    heading_rad: Float32Array  # (N,)
+    lane_start: IntArray  # (L + 1,) first bin of each lane
+    reach_start: np.ndarray[tuple[int], np.dtype[np.int64]]  # (N + 1,)
+    reach_bin: IntArray  # (R,)
+    reach_m: Float32Array  # (R,) arc length from bin centre to bin centre
+    reach_changes: UInt8Array  # (R,) lane changes on the way, 0 or 1
+    reach_limit_m: float
+
+    @property
+    def bin_count(self) -> int:
+        return len(self.lane)
+
+
+def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 1.0) -> LaneGraph:
+    """Cut every lane into bins and tabulate the bins within ``reach_limit_m`` ahead, lane changes to direct neighbours included."""
+    lengths = network.lane_lengths_m()
+    counts = np.maximum(1, np.ceil(lengths / bin_m - 1e-9)).astype(np.int32)
+    lane_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    lane = np.repeat(np.arange(network.lane_count, dtype=np.int32), counts)
+    order = np.arange(len(lane)) - lane_start[lane]
+    position = (order + 0.5) * (lengths / counts)[lane]
+    tables = _reach_tables(
+        lane, position, lane_start, lengths, network.successor, network.successor_start, network.left_lane, network.right_lane,
+        float(reach_limit_m),
+    )  # fmt: skip
+    return LaneGraph(
+        lane=lane,
+        position_m=position,
+        points_m=_points_at(network, lane, position),
+        heading_rad=_headings_at(network, lane, position, lengths).astype(np.float32),
+        lane_start=lane_start,
+        reach_start=tables[0],
+        reach_bin=tables[1],
+        reach_m=tables[2],
+        reach_changes=tables[3],
+        reach_limit_m=reach_limit_m,
+    )
+
+
+def _points_at(network: RoadNetwork, lane: IntArray, position_m: FloatArray) -> FloatArray:
+    """Points (N, 2) at arc lengths on lanes."""
+    steps = np.linalg.norm(np.diff(network.points_m, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])  # runs on over the gaps between lanes, which no position reaches
+    s = along[network.point_start[lane]] + position_m
+    points: FloatArray = np.stack([np.interp(s, along, network.points_m[:, axis]) for axis in (0, 1)], axis=-1)
+    return points
+
+
+def _headings_at(network: RoadNetwork, lane: IntArray, position_m: FloatArray, lengths_m: FloatArray) -> FloatArray:
+    """Direction (N,) of the chord around each position, cut at the lane's ends."""
+    ahead = _points_at(network, lane, np.minimum(position_m + _CHORD_M, lengths_m[lane]))
+    behind = _points_at(network, lane, np.maximum(position_m - _CHORD_M, 0.0))
+    chord = ahead - behind
+    heading: FloatArray = np.arctan2(chord[:, 1], chord[:, 0])
+    return heading
+
+
+@njit(cache=True)
+def _walk(
+    bin_, lane, position, lane_start, lengths, successor, successor_start, left, right, limit, stack, out_bin, out_m, out_changes
+):  # type: ignore[no-untyped-def]
+    """Fill ``out_*`` with what lies ahead of ``bin_``; returns the count. Counts only, if ``out_bin`` is empty."""
+    own = lane[bin_]
+    fill = out_bin.shape[0] > 0
+    size = 0
+    count = 0
+    for side in range(3):
+        first = own if side == 0 else (left[own] if side == 1 else right[own])
+        if first < 0:
+            continue
+        base = -position[bin_] if side == 0 else -position[bin_] * lengths[first] / max(lengths[own], 1e-6)
+        stack[size, 0], stack[size, 1], stack[size, 2] = first, base, min(side, 1)
+        size += 1
+    while size > 0:
+        size -= 1
+        at, base, changes = int(stack[size, 0]), stack[size, 1], stack[size, 2]
+        for j in range(lane_start[at], lane_start[at + 1]):
+            ahead = base + position[j]
+            if ahead > limit:
+                break
+            if ahead <= 0.0:
+                continue
+            if fill:
+                out_bin[count], out_m[count], out_changes[count] = j, ahead, changes
+            count += 1
+        end = base + max(lengths[at], 1e-3)
+        if end < limit:
+            for e in range(successor_start[at], successor_start[at + 1]):
+                if size < stack.shape[0]:
+                    stack[size, 0], stack[size, 1], stack[size, 2] = successor[e], end, changes
+                    size += 1
+    return count
+
+
+@njit(cache=True)
+def _reach_tables(lane, position, lane_start, lengths, successor, successor_start, left, right, limit):  # type: ignore[no-untyped-def]
+    bins = lane.shape[0]
+    stack = np.empty((_MAX_STACK, 3))
+    start = np.zeros(bins + 1, np.int64)
+    none_bin, none_m, none_changes = np.empty(0, np.int32), np.empty(0, np.float32), np.empty(0, np.uint8)
+    for i in range(bins):
+        start[i + 1] = start[i] + _walk(
+            i, lane, position, lane_start, lengths, successor, successor_start, left, right, limit, stack,
+            none_bin, none_m, none_changes,
+        )  # fmt: skip
+    reach_bin = np.empty(start[-1], np.int32)
+    reach_m = np.empty(start[-1], np.float32)
+    reach_changes = np.empty(start[-1], np.uint8)
+    for i in range(bins):
+        row = slice(start[i], start[i + 1])
+        if start[i + 1] == start[i]:
+            continue
+        _walk(
+            i, lane, position, lane_start, lengths, successor, successor_start, left, right, limit, stack,
+            reach_bin[row], reach_m[row], reach_changes[row],
+        )  # fmt: skip
+        order = np.argsort(reach_m[row], kind="mergesort")
+        reach_bin[row] = reach_bin[row][order]
+        reach_m[row] = reach_m[row][order]
+        reach_changes[row] = reach_changes[row][order]
+    return start, reach_bin, reach_m, reach_changes

@@ -38,9 +38,11 @@ class AttractorConfig:
     floor: float = 1e-6  # of the information: keeps reliabilities positive, Eqs. (6)-(7) alone do not
 
 
-def paper_config(information: float = 100.0) -> AttractorConfig:
-    """Constants of a public descendant of the published network: only the calibration cells are inhibited mutually."""
-    return AttractorConfig(mode="paper", information=information, inhibition_integrator=0.0, inhibition_calibration=0.2)
+def paper_config(information: float = 100.0, inhibition_calibration: float = 0.2) -> AttractorConfig:
+    """The printed network; strengths of a public descendant, where only the calibration cells are inhibited mutually."""
+    return AttractorConfig(
+        mode="paper", information=information, inhibition_integrator=0.0, inhibition_calibration=inhibition_calibration
+    )
 
 
 @njit(cache=True)

@@ -18,8 +18,8 @@ from hippodrome.core.attractor import AttractorConfig, wrap
 from hippodrome.core.types import FloatArray
 
 PERIOD_RATIOS = (97.0, 131.0, 173.0)  # pairwise coprime: the joint code repeats only after 97 * 131 * 173 units
-GRID_INFORMATION = 238.6  # E of the first module, 1/rad^2: sigma of 1 m at a period of 97 m, the family's "1 per axis"
 TURN = 2.0 * math.pi
+GRID_INFORMATION = (PERIOD_RATIOS[0] / TURN) ** 2  # E of the first module, 1/rad^2: 1 m at a period of 97 m, "1 per axis"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

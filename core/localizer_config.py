@@ -41,12 +41,16 @@ class InjectionNoise:
 
 @dataclass(frozen=True)
 class PaperNetworks:
-    """Mode "paper": the printed networks, one torus, strengths and period of public descendants."""
+    """Mode "paper": the printed networks on one torus, with strengths that give them their best chance.
+
+    At 0.2 per update, as in a public descendant, no injection outlives a second and the read-out never follows the views; at
+    0.02 the calibration cells win and stay.
+    """
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
-    head: AttractorConfig = field(default_factory=paper_config)
-    grid: AttractorConfig = field(default_factory=lambda: paper_config(GRID_INFORMATION))
+    head: AttractorConfig = field(default_factory=lambda: paper_config(inhibition_calibration=0.02))
+    grid: AttractorConfig = field(default_factory=lambda: paper_config(GRID_INFORMATION, 0.02))
     period_m: float = 150.0
     strength: float = 0.3  # of E, per injection: the family uses 0.1 to 0.4
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -76,6 +76,15 @@ def turned(local: FloatArray, origin_m: FloatArray, yaw_rad: FloatArray) -> Floa
     return np.stack([x, y, z], axis=-1)
 
 
+def placed(
+    local_m: FloatArray, centre_m: FloatArray, yaw_rad: FloatArray, albedo: FloatArray, surface: Surface = Surface.MINERAL
+) -> Mesh:
+    """Polygons (k, f, c, 3) in the axes of k things, whose colours (k, 3) they take."""
+    k, f, c, _ = local_m.shape
+    world = turned(local_m.reshape(k, f * c, 3), centre_m, yaw_rad)
+    return polygons(world.reshape(k * f, c, 3), np.repeat(albedo, f, axis=0), surface)
+
+
 # Corners of a unit box's faces (length -0.5..0.5, width -0.5..0.5, height 0..1): front, left, back, right, top.
 BOX_FACES = np.array(
     [
@@ -112,8 +121,3 @@ def instances(template: Mesh, origin_m: FloatArray, yaw_rad: FloatArray, scale: 
         surface=np.tile(template.surface, k),
         faces=(np.arange(k)[:, None, None] * n + template.faces).reshape(-1, 3).astype(np.int32),
     )
-
-
-def shifted(mesh: Mesh, offset_m: FloatArray) -> Mesh:
-    """The mesh moved by (3,)."""
-    return replace(mesh, vertices_m=(mesh.vertices_m + offset_m).astype(np.float32))

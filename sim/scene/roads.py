@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 import shapely
+from scipy.spatial import KDTree
 
 from hippodrome.core.types import FloatArray
-from hippodrome.sim.scene.lanes import Beside, Pieces, beside, cut_lanes
-from hippodrome.sim.scene.mesh import Mesh, Surface, merge, polygons
+from hippodrome.sim.scene.lanes import PIECE_M, Beside, Pieces, beside, cut_lanes
+from hippodrome.sim.scene.mesh import Mesh, Surface, merge, placed, polygons
 from hippodrome.sim.types import Town
 
 JUNCTION_Z_M: Final = 0.025  # layers lie far enough apart for the depth buffer, and too close to be seen
 ROAD_Z_M: Final = 0.03
 PAINT_Z_M: Final = 0.05
+DASH_PERIOD_M: Final = 9.0  # a dash of one piece and a gap of two
+PAVED_SHARE: Final = 0.5
+PAVEMENT_M: Final = 1.6
 LINE_M: Final = 0.14  # width of a painted line
 KERB_M: Final = (0.16, 0.12)  # width, height
 VERGE_M: Final = 0.9  # gravel between the asphalt and the grass
@@ -25,36 +30,41 @@ KERBSTONE: Final = np.array([0.68, 0.67, 0.65])
 PAVING: Final = np.array([0.62, 0.60, 0.57])
 
 
-def road_mesh(town: Town, origin_m: FloatArray, rng: np.random.Generator) -> tuple[Mesh, Mesh]:
-    """Bold and fine parts of the roads."""
+def road_mesh(
+    town: Town, origin_m: FloatArray, town_share: Callable[[FloatArray], FloatArray], rng: np.random.Generator
+) -> tuple[Mesh, Mesh]:
+    """Bold and fine parts of the roads; ``town_share`` gives at (k, 2) how much of a town it is there: kerbs or gravel."""
     network = town.network
     pieces = cut_lanes(network, origin_m)
-    tone = rng.uniform(0.86, 1.12, len(network.edge_ids))[network.lane_edge]
-    tone = np.where(network.is_internal, 1.0, tone)
-    patch = rng.uniform(0.96, 1.04, len(pieces.lane))
-    surface = strip(pieces, -pieces.half_width_m, pieces.half_width_m, ROAD_Z_M, ASPHALT * (tone[pieces.lane] * patch)[:, None])
-    bold, fine = [surface, _junctions(town, origin_m)], []
+    tone = np.where(network.is_internal, 1.0, rng.uniform(0.88, 1.1, len(network.edge_ids))[network.lane_edge])[pieces.lane]
+    patch = rng.uniform(0.97, 1.03, len(pieces.lane))
+    bold = [
+        strip(pieces, -pieces.half_width_m, pieces.half_width_m, ROAD_Z_M, ASPHALT * (tone * patch)[:, None]),
+        _junctions(town, origin_m),
+    ]
+    fine = []
     open_road = ~network.is_internal[pieces.lane]
     for side in (1, -1):
         kind, other = beside(pieces, network.is_internal, side)
-        edge = (kind == Beside.NOTHING) & open_road
-        bold.append(_verge(pieces.select(edge), side))
-        fine.append(_line(pieces.select(edge), side, inset_m=0.2))
-        dash = (
-            (kind != Beside.NOTHING)
-            & (kind != Beside.JUNCTION)
-            & open_road
-            & (pieces.lane < other)
-            & (pieces.along_m % (3 * 3.0) < 3.0)
-        )
-        fine.append(_line(pieces.select(dash), side, inset_m=0.0))
-    return merge(bold), merge(fine)
+        edge = pieces.select((kind == Beside.NOTHING) & open_road)
+        paved = town_share(edge.middle_m()) > PAVED_SHARE
+        bold += [_verge(edge.select(~paved), side), _pavement(edge.select(paved), side)]
+        fine.append(_line(edge, side, inset_m=0.2))
+        between = np.isin(kind, (Beside.OPPOSITE, Beside.SAME_DIRECTION)) & open_road & (pieces.lane < other)
+        dashed = between & (pieces.along_m % DASH_PERIOD_M < PIECE_M)
+        fine.append(_line(pieces.select(dashed), side, inset_m=0.0))
+    return merge(bold), merge([*fine, _stop_lines(town, origin_m)])
 
 
 def strip(
-    pieces: Pieces, right_m: FloatArray, left_m: FloatArray, z_m: float, albedo: FloatArray, surface: Surface = Surface.MINERAL
+    pieces: Pieces,
+    right_m: FloatArray,
+    left_m: FloatArray,
+    z_m: float | FloatArray,
+    albedo: FloatArray,
+    surface: Surface = Surface.MINERAL,
 ) -> Mesh:
-    """Flat quads along the pieces, between two lateral offsets (P,), left positive."""
+    """Flat quads along the pieces, between two lateral offsets (P,), left positive; ``z_m`` one height or those of the 4 corners."""
     corners = [
         pieces.start_m + right_m[:, None] * pieces.start_normal,
         pieces.end_m + right_m[:, None] * pieces.end_normal,
@@ -62,7 +72,8 @@ def strip(
         pieces.start_m + left_m[:, None] * pieces.start_normal,
     ]
     flat = np.stack(corners, axis=1)
-    return polygons(np.concatenate([flat, np.full((*flat.shape[:2], 1), z_m)], axis=2), albedo, surface)
+    height = np.broadcast_to(z_m, flat.shape[:2])[..., None]
+    return polygons(np.concatenate([flat, height], axis=2), albedo, surface)
 
 
 def _line(pieces: Pieces, side: int, inset_m: float) -> Mesh:
@@ -73,6 +84,49 @@ def _line(pieces: Pieces, side: int, inset_m: float) -> Mesh:
 def _verge(pieces: Pieces, side: int) -> Mesh:
     inner, outer = side * (pieces.half_width_m - 0.05), side * (pieces.half_width_m + VERGE_M)
     return strip(pieces, np.minimum(inner, outer), np.maximum(inner, outer), 0.5 * JUNCTION_Z_M, GRAVEL)
+
+
+def _pavement(pieces: Pieces, side: int) -> Mesh:
+    """A kerb with its face to the road, and slabs behind it, sloping down to the grass."""
+    border, kerb, slabs = (side * (pieces.half_width_m + w) for w in (0.0, KERB_M[0], KERB_M[0] + PAVEMENT_M))
+    face = _slope(pieces, border, border + side * 0.02, 0.0, KERB_M[1], KERBSTONE, side)
+    top = _slope(pieces, border + side * 0.02, kerb, KERB_M[1], KERB_M[1], KERBSTONE, side)
+    slab = _slope(pieces, kerb, slabs, KERB_M[1], KERB_M[1], PAVING, side)
+    back = _slope(pieces, slabs, slabs + side * 0.15, KERB_M[1], 0.0, PAVING, side)
+    return merge([face, top, slab, back])
+
+
+def _slope(
+    pieces: Pieces,
+    inner_m: FloatArray,
+    outer_m: FloatArray,
+    inner_z_m: float,
+    outer_z_m: float | FloatArray,
+    albedo: FloatArray,
+    side: int,
+) -> Mesh:
+    """A strip seen from above, whose two long edges lie at different heights."""
+    right, left = (inner_m, outer_m) if side > 0 else (outer_m, inner_m)
+    right_z, left_z = (inner_z_m, outer_z_m) if side > 0 else (outer_z_m, inner_z_m)
+    return strip(pieces, right, left, np.array([right_z, right_z, left_z, left_z]), albedo)
+
+
+def _stop_lines(town: Town, origin_m: FloatArray) -> Mesh:
+    """Bars across the lanes' ends where a signal or sign stands."""
+    network = town.network
+    last = network.point_start[1:] - 1
+    end, before = network.points_m[last], network.points_m[last - 1]
+    near = KDTree(town.signals_m[:, :2]).query(end)[0] < 3.0 if len(town.signals_m) else np.zeros(len(end), dtype=bool)
+    rows = near & ~network.is_internal
+    heading = np.arctan2(*(end - before)[rows].T[::-1])
+    half = 0.5 * network.width_m[rows] - 0.1
+    x, y = np.broadcast_to([-0.9, -0.5, -0.5, -0.9], (len(half), 4)), half[:, None] * np.array([-1, -1, 1, 1])
+    return placed(
+        np.stack([x, y, np.full_like(y, PAINT_Z_M)], axis=-1)[:, None],
+        end[rows] - origin_m,
+        heading,
+        np.tile(PAINT, (len(half), 1)),
+    )
 
 
 def _junctions(town: Town, origin_m: FloatArray) -> Mesh:

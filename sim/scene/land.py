@@ -1,0 +1,109 @@
+"""The ground: grass in uneven tones, fields with their rows, fences around some."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from hippodrome.core.types import FloatArray
+from hippodrome.sim.scene.mesh import Mesh, Surface, boxes, merge, polygons, turned
+from hippodrome.sim.scene.placement import Border, Shapes, clear_of, quilt, rectangles, spread
+
+CELL_M: Final = 80.0  # as the tiles, so that no cell straddles two
+FINE_CELLS: Final = 8  # per side of a cell near the road
+NEAR_M: Final = 90.0  # from the road, where the ground's unevenness is visible
+REACH_M: Final = 280.0  # from the road, where the haze takes over
+FIELD_Z_M: Final = 0.006
+ROW_Z_M: Final = 0.014
+GRASS: Final = np.array([0.36, 0.46, 0.21])
+STRAW: Final = np.array([0.50, 0.50, 0.27])
+# Field and row colours: wheat, young corn, ploughed earth, meadow, rape.
+FIELDS: Final = np.array([[0.74, 0.64, 0.36], [0.42, 0.38, 0.24], [0.42, 0.33, 0.25], [0.44, 0.54, 0.24], [0.70, 0.66, 0.16]])
+ROWS: Final = np.array([[0.66, 0.55, 0.28], [0.30, 0.48, 0.20], [0.34, 0.26, 0.19], [0.38, 0.50, 0.20], [0.62, 0.62, 0.20]])
+ROW_M: Final = 2.4  # between rows
+FENCE_WOOD: Final = np.array([0.46, 0.38, 0.29])
+
+
+def ground_mesh(road_points_m: FloatArray, rng: np.random.Generator) -> Mesh:
+    """Grass around all roads (n, 2), coarse where far away."""
+    low = np.floor((road_points_m.min(axis=0) - REACH_M) / CELL_M)
+    high = np.ceil((road_points_m.max(axis=0) + REACH_M) / CELL_M)
+    grid = np.stack(np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1])), axis=-1).reshape(-1, 2) * CELL_M
+    distance = KDTree(road_points_m).query(grid + 0.5 * CELL_M)[0] - 0.7 * CELL_M  # less the cell's half diagonal
+    fine, coarse = grid[distance < NEAR_M], grid[(distance >= NEAR_M) & (distance < REACH_M)]
+    step = CELL_M / FINE_CELLS
+    offsets = step * np.stack(np.meshgrid(np.arange(FINE_CELLS), np.arange(FINE_CELLS)), axis=-1).reshape(1, -1, 2)
+    tone = np.random.default_rng(rng.integers(2**63))
+    seeds = tone.integers(2**63, size=2)
+    parts = [_squares((fine[:, None] + offsets).reshape(-1, 2), step, seeds), _squares(coarse, CELL_M, seeds)]
+    return merge(parts)
+
+
+def _squares(corner_m: FloatArray, side_m: float, seeds: np.ndarray) -> Mesh:
+    """Ground squares with a colour at each corner, taken from fields that know no squares."""
+    corners = corner_m[:, None] + side_m * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    flat = corners.reshape(-1, 2)
+    dry = quilt(flat, 140.0, np.random.default_rng(seeds[0]))[:, None]
+    mottle = quilt(flat, 28.0, np.random.default_rng(seeds[1]))[:, None]
+    albedo = ((1.0 - 0.6 * dry) * GRASS + 0.6 * dry * STRAW) * (0.84 + 0.30 * mottle)
+    return polygons(np.concatenate([corners, np.zeros((len(corners), 4, 1))], 2), albedo.reshape(-1, 4, 3), Surface.GRASS)
+
+
+def field_mesh(border: Border, roads: Shapes, houses: Shapes, rng: np.random.Generator) -> tuple[Mesh, Mesh]:
+    """Fields (bold), their rows and fences (fine), wherever there is room."""
+    site = border.draw(16.0, rng)
+    k = len(site.length_m)
+    length, width = rng.uniform(18.0, 70.0, k), rng.uniform(14.0, 45.0, k)
+    centre = site.point_m + site.outward * (rng.uniform(2.5, 30.0, k) + 0.5 * width)[:, None]
+    yaw = site.inward_yaw_rad() + rng.normal(0.0, 0.06, k)
+    shapes = rectangles(centre, yaw, length, width)
+    free = np.flatnonzero(clear_of(shapes, roads, 1.6) & clear_of(shapes, houses, 1.0))
+    free = free[spread(shapes[free], 2.0)]
+    kind = rng.integers(len(FIELDS), size=k)
+    tone = rng.uniform(0.9, 1.1, (k, 1))
+    base = _sheets(
+        centre[free], yaw[free], length[free], width[free], np.zeros(len(free)), FIELD_Z_M, (FIELDS[kind] * tone)[free]
+    )
+    rows = np.floor(width[free] / ROW_M).astype(np.int64)
+    owner = np.repeat(free, rows)
+    number = np.arange(len(owner)) - np.repeat(np.cumsum(rows) - rows, rows)
+    offset = (number + 0.5) * ROW_M - 0.5 * width[owner]
+    stripe = _sheets(
+        centre[owner], yaw[owner], length[owner], np.full(len(owner), 0.45 * ROW_M), offset, ROW_Z_M, (ROWS[kind] * tone)[owner]
+    )
+    fenced = free[rng.random(len(free)) < 0.45]
+    return base, merge([stripe, _fences(centre[fenced], yaw[fenced], length[fenced] + 1.2, width[fenced] + 1.2)])
+
+
+def _sheets(
+    centre_m: FloatArray,
+    yaw_rad: FloatArray,
+    length_m: FloatArray,
+    width_m: FloatArray,
+    offset_m: FloatArray,
+    z_m: float,
+    albedo: FloatArray,
+) -> Mesh:
+    """Flat rectangles (k,), shifted along their own y axis."""
+    x = 0.5 * length_m[:, None] * np.array([-1, 1, 1, -1])
+    y = 0.5 * width_m[:, None] * np.array([-1, -1, 1, 1]) + offset_m[:, None]
+    return polygons(turned(np.stack([x, y, np.full_like(x, z_m)], axis=-1), centre_m, yaw_rad), albedo, Surface.CROP)
+
+
+def _fences(centre_m: FloatArray, yaw_rad: FloatArray, length_m: FloatArray, width_m: FloatArray) -> Mesh:
+    """Two rails and posts along the front of each field (its own +y side, towards the road)."""
+    k = len(centre_m)
+    front = np.stack([np.zeros(k), 0.5 * width_m], axis=1)
+    rails = []
+    for z_m in (0.45, 0.90):
+        foot = turned(np.concatenate([front, np.full((k, 1), z_m)], 1)[:, None], centre_m, yaw_rad)[:, 0]
+        rails.append(boxes(foot, yaw_rad, np.stack([length_m, np.full(k, 0.05), np.full(k, 0.13)], axis=1), FENCE_WOOD))
+    posts = np.floor(length_m / 2.5).astype(np.int64)
+    owner = np.repeat(np.arange(k), posts)
+    number = np.arange(len(owner)) - np.repeat(np.cumsum(posts) - posts, posts)
+    x = (number + 0.5) * 2.5 - 0.5 * length_m[owner]
+    foot = turned(np.stack([x, front[owner, 1], np.zeros(len(x))], axis=1)[:, None], centre_m[owner], yaw_rad[owner])[:, 0]
+    post = boxes(foot[:, :2], yaw_rad[owner], np.tile([0.12, 0.12, 1.15], (len(x), 1)), 0.9 * FENCE_WOOD)
+    return merge([*rails, post])

@@ -25,7 +25,7 @@ from hippodrome.sim.yaml_file import load_yaml
 class DriveSpec(Spec):
     """One drive through the town: where, among whom, in which light."""
 
-    tour: TourSpec = TourSpec()
+    tour: TourSpec
     traffic: TrafficSpec = TrafficSpec()
     ego: EgoSpec = EgoSpec()
     conditions: Conditions = Conditions()
@@ -52,8 +52,8 @@ class Scenario(Spec):
     camera: CameraSpec = CameraSpec()
     odometry_rate_hz: Annotated[float, Field(gt=0, le=200)] = 10.0
     noise: NoiseLevel | SelfMotionNoise = "paper"
-    mapping: DriveSpec = DriveSpec()
-    localization: DriveSpec = DriveSpec()
+    mapping: DriveSpec = DriveSpec(tour=TourSpec(length_m=3600))
+    localization: DriveSpec = DriveSpec(tour=TourSpec(length_m=1200))
     mapper: MapperConfig = MapperConfig()
     refine: RefineConfig = RefineConfig()
     localizer: LocalizerConfig = LocalizerConfig()

@@ -30,9 +30,9 @@ class PaperRefineConfig:
 
     alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
     matching: PaperMatchConfig = field(default_factory=PaperMatchConfig)
-    rounds: int = 3  # of match and optimise; each undoes some of the along-track error of the last projection
+    rounds: int = 4  # of match and optimise; each undoes some of the along-track error of the last projection
     local_weight: float = 1.0  # w_l of Eq. (12)
-    global_weight: float = 0.04  # w_g of Eq. (12), 1/m^2: a vertex may lie 5 m from its matched position at the price of 1 sigma
+    global_weight: float = 0.16  # w_g of Eq. (12), 1/m^2: a vertex may lie 2.5 m from its matched position at the price of 1 sigma
     closure_gate_sigma: float = 4.0  # closures farther than this from the map's own poses are left out
     min_sigma: tuple[float, float, float] = (0.05, 0.05, 0.005)  # floor of the edges' sigma: map units, map units, rad
     max_iterations: int = 20
@@ -77,7 +77,7 @@ def optimise(poses: FloatArray, edges: Edges, matched: MatchedPath, config: Pape
         on_road = global_residual(at, vertex, matched.matched_m[vertex])
         return total_residual(local, on_road, config.local_weight, config.global_weight)
 
-    damping = 1e-6  # holds what no match determines; against 0.04 1/m^2 of one matched vertex it moves nothing
+    damping = 1e-6  # holds what no match determines; against the weight of one matched vertex it moves nothing
     state = gauss_newton(linearise, poses.ravel(), max_iterations=config.max_iterations, tolerance=1e-4, damping=damping).state
     poses = state.reshape(-1, 3)
     return np.column_stack([poses[:, :2], se2.wrap(poses[:, 2])])

@@ -39,6 +39,27 @@ def grid_network(rng, columns=6, rows=5, spacing_m=120.0, jitter_m=25.0, missing
     return network_of_roads(nodes, roads)
 
 
+def lanes_of(*lines, successor=()):
+    """A network of the given centrelines; ``successor``: pairs (lane, lane)."""
+    starts = np.cumsum([0] + [len(line) for line in lines]).astype(np.int32)
+    onward = [[b for a, b in successor if a == lane] for lane in range(len(lines))]
+    count = len(lines)
+    return RoadNetwork(
+        lane_ids=tuple(f"e{i}_0" for i in range(count)),
+        edge_ids=tuple(f"e{i}" for i in range(count)),
+        lane_edge=np.arange(count, dtype=np.int32),
+        is_internal=np.zeros(count, dtype=bool),
+        width_m=np.full(count, 3.2),
+        speed_limit_mps=np.full(count, 10.0),
+        points_m=np.concatenate([np.asarray(line, dtype=float) for line in lines]),
+        point_start=starts,
+        successor=np.array([b for after in onward for b in after], dtype=np.int32),
+        successor_start=np.cumsum([0] + [len(after) for after in onward]).astype(np.int32),
+        left_lane=np.full(count, -1, dtype=np.int32),
+        right_lane=np.full(count, -1, dtype=np.int32),
+    )
+
+
 def network_of_roads(nodes, roads):
     """RoadNetwork of two-way roads (node, node, bow in metres) between nodes (n, 2)."""
     lanes, begins, ends = [], [], []

@@ -22,6 +22,7 @@ STRAW: Final = np.array([0.50, 0.50, 0.27])
 # Field and row colours: wheat, young corn, ploughed earth, meadow, rape.
 FIELDS: Final = np.array([[0.74, 0.64, 0.36], [0.42, 0.38, 0.24], [0.42, 0.33, 0.25], [0.44, 0.54, 0.24], [0.70, 0.66, 0.16]])
 ROWS: Final = np.array([[0.66, 0.55, 0.28], [0.30, 0.48, 0.20], [0.34, 0.26, 0.19], [0.38, 0.50, 0.20], [0.62, 0.62, 0.20]])
+PATCHES: Final = np.array([[0.28, 0.42, 0.16], [0.46, 0.52, 0.24], [0.54, 0.52, 0.30], [0.24, 0.36, 0.15], [0.46, 0.40, 0.28]])
 ROW_M: Final = 2.4  # between rows
 FENCE_WOOD: Final = np.array([0.46, 0.38, 0.29])
 
@@ -49,6 +50,18 @@ def _squares(corner_m: FloatArray, side_m: float, seeds: np.ndarray) -> Mesh:
     mottle = quilt(flat, 28.0, np.random.default_rng(seeds[1]))[:, None]
     albedo = ((1.0 - 0.6 * dry) * GRASS + 0.6 * dry * STRAW) * (0.84 + 0.30 * mottle)
     return polygons(np.concatenate([corners, np.zeros((len(corners), 4, 1))], 2), albedo.reshape(-1, 4, 3), Surface.GRASS)
+
+
+def patch_mesh(border: Border, rng: np.random.Generator) -> Mesh:
+    """Irregular patches of taller, drier or trodden grass and bare earth beside the road (fine)."""
+    site = border.draw(2.0, rng)
+    k, sides = len(site.length_m), 6
+    centre = site.point_m + site.outward * (1.2 + 12.0 * rng.random(k) ** 2)[:, None]
+    angle = 2.0 * np.pi * np.arange(sides) / sides + rng.uniform(0.0, 1.0, (k, 1))
+    radius = rng.uniform(0.3, 1.5, (k, 1)) * rng.uniform(0.5, 1.0, (k, sides))
+    local = np.stack([1.6 * radius * np.cos(angle), radius * np.sin(angle), np.full((k, sides), FIELD_Z_M)], axis=-1)
+    albedo = PATCHES[rng.integers(len(PATCHES), size=k)] * rng.uniform(0.85, 1.15, (k, 1))
+    return polygons(turned(local, centre, site.inward_yaw_rad()), albedo, Surface.GRASS)
 
 
 def field_mesh(border: Border, roads: Shapes, houses: Shapes, rng: np.random.Generator) -> tuple[Mesh, Mesh]:

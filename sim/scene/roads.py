@@ -16,6 +16,8 @@ from hippodrome.sim.types import Town
 
 JUNCTION_Z_M: Final = 0.025  # layers lie far enough apart for the depth buffer, and too close to be seen
 ROAD_Z_M: Final = 0.03
+REPAIR_Z_M: Final = 0.04
+REPAIRED_SHARE: Final = 0.12  # of the lanes' length: an ordinary road has been opened here and there
 PAINT_Z_M: Final = 0.05
 DASH_PERIOD_M: Final = 9.0  # a dash of one piece and a gap of two
 PAVED_SHARE: Final = 0.5
@@ -53,7 +55,7 @@ def road_mesh(
         between = np.isin(kind, (Beside.OPPOSITE, Beside.SAME_DIRECTION)) & open_road & (pieces.lane < other)
         dashed = between & (pieces.along_m % DASH_PERIOD_M < PIECE_M)
         fine.append(_line(pieces.select(dashed), side, inset_m=0.0))
-    return merge(bold), merge([*fine, _stop_lines(town, origin_m)])
+    return merge(bold), merge([_repairs(pieces.select(open_road), rng), *fine, _stop_lines(town, origin_m)])
 
 
 def strip(
@@ -109,6 +111,14 @@ def _slope(
     right, left = (inner_m, outer_m) if side > 0 else (outer_m, inner_m)
     right_z, left_z = (inner_z_m, outer_z_m) if side > 0 else (outer_z_m, inner_z_m)
     return strip(pieces, right, left, np.array([right_z, right_z, left_z, left_z]), albedo)
+
+
+def _repairs(pieces: Pieces, rng: np.random.Generator) -> Mesh:
+    """Rectangles of newer or older asphalt."""
+    chosen = pieces.select(rng.random(len(pieces.lane)) < REPAIRED_SHARE)
+    right = chosen.half_width_m * rng.uniform(-0.85, 0.1, len(chosen.lane))
+    left = right + chosen.half_width_m * rng.uniform(0.3, 0.75, len(chosen.lane))
+    return strip(chosen, right, left, REPAIR_Z_M, ASPHALT * rng.uniform(0.72, 1.16, (len(chosen.lane), 1)))
 
 
 def _stop_lines(town: Town, origin_m: FloatArray) -> Mesh:

@@ -10,7 +10,7 @@ import numpy as np
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.scene.buildings import building_mesh, place_buildings
 from hippodrome.sim.scene.furniture import furniture_mesh
-from hippodrome.sim.scene.land import field_mesh, ground_mesh
+from hippodrome.sim.scene.land import field_mesh, ground_mesh, patch_mesh
 from hippodrome.sim.scene.lanes import cut_lanes
 from hippodrome.sim.scene.mesh import Mesh, merge
 from hippodrome.sim.scene.placement import borders, paved_area, quilt
@@ -42,7 +42,7 @@ def town_mesh(town: Town, seed: int, origin_m: FloatArray) -> tuple[Mesh, Mesh]:
     land = ground_mesh(pieces.middle_m(), ground)
     # What hides other things comes first: the depth test then spares the shading of what is hidden, the ground last of all.
     bold = merge([house_bold, hedges, road_bold, tree_mesh(trees, plant), treelines, field_bold, land])
-    return bold, merge([house_fine, posts, road_fine, field_fine])
+    return bold, merge([house_fine, posts, road_fine, field_fine, patch_mesh(border, ground)])
 
 
 def _town_share(town: Town, rng: np.random.Generator) -> Callable[[FloatArray], FloatArray]:

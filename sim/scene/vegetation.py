@@ -17,12 +17,12 @@ ROUND, BROAD, POPLAR, SPRUCE, PINE, BUSH = range(6)
 # Shape: height [m] from..to, crown radius [m] from..to.
 TREES: Final = np.array(
     [
-        [5.0, 9.0, 1.8, 3.0],
-        [8.0, 14.0, 3.0, 5.0],
-        [11.0, 18.0, 1.0, 1.7],
-        [7.0, 15.0, 1.8, 3.0],
-        [8.0, 13.0, 1.8, 2.8],
-        [1.0, 2.2, 0.7, 1.6],
+        [5.0, 8.5, 2.0, 3.2],
+        [8.0, 13.0, 3.4, 5.2],
+        [11.0, 17.0, 1.2, 2.0],
+        [7.0, 15.0, 2.0, 3.4],
+        [8.0, 12.0, 2.2, 3.2],
+        [1.0, 2.4, 0.8, 1.8],
     ]
 )
 MIX: Final = np.array([0.26, 0.22, 0.08, 0.14, 0.08, 0.22])
@@ -96,17 +96,17 @@ def _template(shape: int, variant: int) -> Mesh:
     leaf = Surface.NEEDLE if shape in (SPRUCE, PINE) else Surface.LEAF
     albedo = np.array(green)
     if shape == ROUND:
-        parts = [_blob([0, 0, 0.64], [1.0, 1.0, 0.38], 7, albedo, leaf, rng), _trunk(0.06, 0.45)]
+        parts = [_blob([0, 0, 0.60], [1.05, 1.05, 0.44], 7, albedo, leaf, rng), _trunk(0.06, 0.4)]
     elif shape == BROAD:
-        lobes = [([0.0, 0.1, 0.62], [0.95, 0.85, 0.36]), ([0.35, -0.35, 0.50], [0.6, 0.6, 0.22])]
-        parts = [*(_blob(c, r, n, albedo, leaf, rng) for (c, r), n in zip(lobes, (7, 6), strict=True)), _trunk(0.07, 0.45)]
+        lobes = [([-0.1, 0.1, 0.62], [0.95, 0.90, 0.42]), ([0.35, -0.35, 0.46], [0.75, 0.75, 0.26])]
+        parts = [*(_blob(c, r, n, albedo, leaf, rng) for (c, r), n in zip(lobes, (7, 6), strict=True)), _trunk(0.06, 0.4)]
     elif shape == POPLAR:
-        parts = [_blob([0, 0, 0.55], [1.0, 1.0, 0.47], 6, albedo, leaf, rng), _trunk(0.12, 0.2)]
+        parts = [_blob([0, 0, 0.54], [1.05, 1.05, 0.50], 6, albedo, leaf, rng), _trunk(0.12, 0.2)]
     elif shape == SPRUCE:
         tiers = ((0.10, 0.62, 1.0), (0.42, 0.85, 0.72), (0.68, 1.0, 0.42))
         parts = [*(_cone(low, high, radius, 7, albedo, leaf, rng) for low, high, radius in tiers), _trunk(0.08, 0.15)]
     elif shape == PINE:
-        parts = [_blob([0.1, 0, 0.80], [1.0, 0.9, 0.19], 7, albedo, leaf, rng), _trunk(0.08, 0.75)]
+        parts = [_blob([0.1, 0, 0.74], [1.05, 0.95, 0.29], 7, albedo, leaf, rng), _trunk(0.07, 0.6)]
     else:
         parts = [_blob([0, 0, 0.42], [1.0, 1.0, 0.56], 6, albedo, leaf, rng)]
     return merge(parts)
@@ -127,7 +127,7 @@ def _blob(
         ]
     )
     unit = np.concatenate([[[0.0, 0.0, -1.0]], ring.reshape(-1, 3), [[0.0, 0.0, 1.0]]])
-    lump = rng.uniform(0.74, 1.0, (len(unit), 1))
+    lump = rng.uniform(0.80, 1.0, (len(unit), 1))
     shade = 0.72 + 0.14 * (unit[:, 2:] + 1.0) + rng.uniform(-0.10, 0.10, (len(unit), 1))
     normals = unit / np.array(radii)
     return Mesh(

@@ -75,8 +75,9 @@ class Buildings:
 
 def place_buildings(border: Border, town_share: FloatArray, roads: Shapes, rng: np.random.Generator) -> Buildings:
     """Two rows along the roads; ``town_share`` (B,) mixes the rural kinds with those of a town."""
-    front = _propose(border, town_share, spacing_m=11.0, behind_m=(0.0, 4.0), stray_rad=0.12, rng=rng)
-    back = _propose(border, town_share, spacing_m=14.0, behind_m=(14.0, 48.0), stray_rad=0.6, rng=rng)
+    sparse = 1.0 + 0.5 * (1.0 - town_share)
+    front = _propose(border, town_share, spacing_m=10.0 * sparse, behind_m=(0.0, 4.0), stray_rad=0.12, rng=rng)
+    back = _propose(border, town_share, spacing_m=14.0 * sparse, behind_m=(14.0, 48.0), stray_rad=0.6, rng=rng)
     proposed = join([front, back])
     proposed = proposed.select(clear_of(proposed.footprints(), roads, ROAD_CLEARANCE_M))
     return proposed.select(spread(proposed.footprints(), GAP_M))

@@ -52,14 +52,15 @@ def borders(pieces: Pieces, is_internal: Bools) -> Border:
     return Border(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def paved_area(town: Town, origin_m: FloatArray) -> Shapes:
-    """Polygons of the lanes and the junctions."""
+def paved_area(town: Town, origin_m: FloatArray) -> tuple[Shapes, Shapes]:
+    """Polygons of all that is paved (lanes and junctions), and of the junctions alone."""
     network = town.network
     owner = np.repeat(np.arange(network.lane_count), np.diff(network.point_start))
     centrelines = shapely.linestrings(network.points_m - origin_m, indices=owner)
     lanes = shapely.buffer(centrelines, 0.5 * network.width_m, cap_style="flat", join_style="mitre", mitre_limit=2.0)
-    junctions = [shapely.Polygon(outline - origin_m) for outline in town.junction_polygons_m]
-    return np.concatenate([lanes, shapely.make_valid(np.array(junctions, dtype=object))])
+    outlines = np.array([shapely.Polygon(outline - origin_m) for outline in town.junction_polygons_m], dtype=object)
+    junctions: Shapes = shapely.make_valid(outlines)
+    return np.concatenate([lanes, junctions]), junctions
 
 
 def rectangles(centre_m: FloatArray, yaw_rad: FloatArray, length_m: FloatArray, width_m: FloatArray) -> Shapes:

@@ -10,8 +10,9 @@ import shapely
 from scipy.spatial import KDTree
 
 from hippodrome.core.types import FloatArray
-from hippodrome.sim.scene.lanes import PIECE_M, Beside, Pieces, beside, cut_lanes
+from hippodrome.sim.scene.lanes import PIECE_M, PROBE_M, Beside, Pieces, beside, cut_lanes
 from hippodrome.sim.scene.mesh import Mesh, Surface, merge, placed, polygons
+from hippodrome.sim.scene.placement import Bools, Shapes, clear_of, paved_area
 from hippodrome.sim.types import Town
 
 JUNCTION_Z_M: Final = 0.025  # layers lie far enough apart for the depth buffer, and too close to be seen
@@ -45,17 +46,34 @@ def road_mesh(
         _junctions(town, origin_m),
     ]
     fine = []
+    roads, junctions = paved_area(town, origin_m)
     open_road = ~network.is_internal[pieces.lane]
     for side in (1, -1):
         kind, other = beside(pieces, network.is_internal, side)
-        edge = pieces.select((kind == Beside.NOTHING) & open_road)
-        paved = town_share(edge.middle_m()) > PAVED_SHARE
+        edge = pieces.select((kind == Beside.NOTHING) & (open_road | ~_leads_into(pieces, side, junctions)))
+        paved = (town_share(edge.middle_m()) > PAVED_SHARE) & _has_room(edge, side, roads)
         bold += [_verge(edge.select(~paved), side), _pavement(edge.select(paved), side)]
         fine.append(_line(edge, side, inset_m=0.2))
         between = np.isin(kind, (Beside.OPPOSITE, Beside.SAME_DIRECTION)) & open_road & (pieces.lane < other)
         dashed = between & (pieces.along_m % DASH_PERIOD_M < PIECE_M)
         fine.append(_line(pieces.select(dashed), side, inset_m=0.0))
     return merge(bold), merge([_repairs(pieces.select(open_road), rng), *fine, _stop_lines(town, origin_m)])
+
+
+def _leads_into(pieces: Pieces, side: int, junctions: Shapes) -> Bools:
+    """Whether a junction's area goes on beyond the border: then the border is no edge of the road."""
+    probe = pieces.middle_m() + side * pieces.left_normal() * (pieces.half_width_m + PROBE_M)[:, None]
+    return ~clear_of(shapely.points(probe), junctions, 0.0)
+
+
+def _has_room(pieces: Pieces, side: int, roads: Shapes) -> Bools:
+    """Whether a pavement beyond the border would stay off every other road."""
+    reach = pieces.half_width_m + KERB_M[0] + PAVEMENT_M
+    corners = [
+        at + side * normal * reach[:, None]
+        for at, normal in ((pieces.start_m, pieces.start_normal), (pieces.end_m, pieces.end_normal))
+    ]
+    return clear_of(shapely.linestrings(np.stack(corners, axis=1)), roads, 0.5)
 
 
 def strip(

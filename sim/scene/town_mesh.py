@@ -27,7 +27,7 @@ def town_mesh(town: Town, seed: int, origin_m: FloatArray) -> tuple[Mesh, Mesh]:
     district, road, build, plant, hedge, field, post, ground = np.random.default_rng(seed).spawn(8)
     share = _town_share(town, district)
     pieces = cut_lanes(town.network, origin_m)
-    border, paved = borders(pieces, town.network.is_internal), paved_area(town, origin_m)
+    border, paved = borders(pieces, town.network.is_internal), paved_area(town, origin_m)[0]
     buildings = place_buildings(border, share(border.point_m), paved, build)
     houses = buildings.footprints()
     trees = place_trees(border, paved, houses, plant)

@@ -1,0 +1,94 @@
+"""Drives: SUMO's ego among SUMO's traffic, then the car's own motion along the path that SUMO's ego took."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.se2 import wrap
+from hippodrome.core.types import FloatArray
+from hippodrome.sim.ego import LENGTH_M, REAR_AXLE_TO_FRONT_M, EgoSpec, Track, follow, wander_m
+from hippodrome.sim.lane_log import driven_edges, lane_pieces
+from hippodrome.sim.path import Piece, piece_starts, sample_count, smooth_path
+from hippodrome.sim.pilot import DriveLog, Pilot
+from hippodrome.sim.sumo_run import SUMO_STEP_S, BackgroundTraffic, sumo_run
+from hippodrome.sim.tour import TourGraph, TourSpec, coverage_and_revisits, tour_graph, toured_area
+from hippodrome.sim.traffic import TrafficSpec, vehicle_types_xml
+from hippodrome.sim.types import Drive, Town
+
+DRIVE_STEP_S: Final = 0.05  # of the ego's car; two steps to one of SUMO's
+NEARBY_M: Final = 15.0  # the pose's projection on its lane lies within this of where the path says
+
+
+def simulate_drive(town: Town, tour: TourSpec, traffic: TrafficSpec, ego: EgoSpec, seed: int) -> Drive:
+    """A drive through the town, the same for the same seed. One at a time per process, as many as wanted one after the other."""
+    graph = tour_graph(town.network)
+    area = toured_area(graph, (1.0 - tour.revisit_share) * tour.planned_length_m())
+    rng_tour, rng_traffic, rng_wander = (np.random.default_rng([seed, stream]) for stream in range(3))
+    with sumo_run(town.net_file, vehicle_types_xml(ego.accel_mps2, ego.decel_mps2, LENGTH_M), seed):
+        others = BackgroundTraffic(traffic, town.network, graph, area, rng_traffic)
+        log = Pilot(town.network, graph, area, tour, ego, rng_tour).drive(others)
+    return _as_drive(town.network, graph, log, ego, rng_wander)
+
+
+def _as_drive(network: RoadNetwork, graph: TourGraph, log: DriveLog, ego: EgoSpec, rng: np.random.Generator) -> Drive:
+    """The car's motion along SUMO's path, and where on the lanes it was."""
+    pieces, front_m = lane_pieces(network, log.lanes(), from_lane_start=True)
+    aside = wander_m(sample_count(pieces), ego.lateral_wander_m, rng) if ego.lateral_wander_m > 0.0 else None
+    t_s: FloatArray = np.arange(round((len(front_m) - 1) * SUMO_STEP_S / DRIVE_STEP_S) + 1, dtype=np.float64) * DRIVE_STEP_S
+    rear_m = np.interp(t_s, SUMO_STEP_S * np.arange(len(front_m)), front_m) - REAR_AXLE_TO_FRONT_M
+    track = follow(smooth_path(network, pieces, aside), rear_m, DRIVE_STEP_S)
+    owner = _owners(pieces, track)
+    number = {int(edge): k for k, edge in enumerate(graph.edges)}
+    edges = [number[edge] for edge in driven_edges(network, pieces) if edge in number]
+    coverage, revisit_share = coverage_and_revisits(edges, graph)
+    return Drive(
+        t_s=t_s,
+        poses_m=np.concatenate([track.poses_m[:, :2], wrap(track.poses_m[:, 2:])], axis=1),
+        speed_mps=track.speed_mps,
+        yaw_rate_radps=track.yaw_rate_radps,
+        lane=np.array([piece.lane for piece in pieces], dtype=np.int32)[owner],
+        lane_position_m=_lane_positions_m(network, pieces, track, owner),
+        traffic=log.traffic(),
+        coverage=coverage,
+        revisit_share=revisit_share,
+    )
+
+
+def _owners(pieces: Sequence[Piece], track: Track) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """The piece (N,) that each pose lies on."""
+    starts = piece_starts(pieces)
+    return np.clip(np.searchsorted(starts, track.u_m, side="right") - 1, 0, len(pieces) - 1)
+
+
+def _lane_positions_m(
+    network: RoadNetwork, pieces: Sequence[Piece], track: Track, owner: np.ndarray[tuple[int], np.dtype[np.int64]]
+) -> FloatArray:
+    """Arc length (N,) of each pose's projection on its lane's centreline, near where the path says it is."""
+    starts = piece_starts(pieces)
+    positions = np.empty(len(owner))
+    bounds = [0, *(np.flatnonzero(np.diff(owner)) + 1).tolist(), len(owner)]
+    for first, end in pairwise(bounds):
+        k = int(owner[first])
+        expected = pieces[k].begin_m + track.u_m[first:end] - starts[k]
+        positions[first:end] = project_m(network.lane_points_m(pieces[k].lane), track.poses_m[first:end, :2], expected)
+    return positions
+
+
+def project_m(line_m: FloatArray, points_m: FloatArray, expected_m: FloatArray) -> FloatArray:
+    """Arc length (n,) of the nearest place on a polyline to each point, within ``NEARBY_M`` of ``expected_m`` along it."""
+    steps = np.diff(line_m, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    begins = np.concatenate([[0.0], np.cumsum(lengths)])[:-1]
+    share = ((points_m[:, None] - line_m[None, :-1]) * steps).sum(-1) / lengths**2
+    share = np.clip(share, 0.0, 1.0)
+    gap = np.linalg.norm(line_m[None, :-1] + share[..., None] * steps - points_m[:, None], axis=-1)
+    along = begins + share * lengths
+    near = np.abs(along - expected_m[:, None]) <= NEARBY_M
+    best = np.argmin(np.where(near, gap, np.inf), axis=1)
+    nearest: FloatArray = along[np.arange(len(points_m)), best]
+    return nearest

@@ -1,0 +1,184 @@
+"""Leads SUMO's ego through its tour: the route, the speed in bends, another way where a turn was missed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import libsumo
+import numpy as np
+
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.types import HippodromeError, IntArray
+from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M, EgoSpec, comfortable_speed_mps
+from hippodrome.sim.lane_log import LaneLog, driven_edges, lane_pieces, lanes_ahead, ways_out, ways_to_edge
+from hippodrome.sim.path import STEP_M, Piece, piece_of_samples, piece_starts, smooth_path
+from hippodrome.sim.sumo_run import EGO, SUMO_STEP_S, BackgroundTraffic, add_vehicle, drawn_length_factors
+from hippodrome.sim.tour import TourGraph, TourSpec, plan_tour
+from hippodrome.sim.types import TrafficLog
+
+WARM_UP_S: Final = 20.0  # traffic spreads before the ego enters
+ENTRY_PATIENCE_S: Final = 120.0  # for a gap to enter the road
+STUCK_AFTER_S: Final = 180.0  # longer than any red light
+SIGHT_AHEAD_M: Final = 80.0  # braking from 50 km/h at 2 m/s^2 takes 50 m
+SIGHT_BEHIND_STEPS: Final = 60  # of the log: the curve that the rear axle is still in
+REFILL_STEPS: Final = 10  # traffic is topped up once a second
+LAST_CHANCE_M: Final = 8.0  # a turn is given up this long before the car would have to stop for it
+SPARE_M: Final = 200.0  # planned beyond the tour's length, so that SUMO's ego does not leave the road before
+
+
+@dataclass(slots=True)
+class DriveLog:
+    """What is written down at each SUMO step while the ego is on the road."""
+
+    lane: list[int] = field(default_factory=list)
+    position_m: list[float] = field(default_factory=list)  # of the front bumper, along the lane as drawn
+    speed_mps: list[float] = field(default_factory=list)
+    start: list[int] = field(default_factory=lambda: [0])
+    vehicle: list[int] = field(default_factory=list)
+    poses_m: list[tuple[float, float, float]] = field(default_factory=list)
+    kind: list[int] = field(default_factory=list)
+
+    def lanes(self, last: int = 0) -> LaneLog:
+        """The ego's part, of the ``last`` steps or of all."""
+        return LaneLog(np.array(self.lane[-last:]), np.array(self.position_m[-last:]), np.array(self.speed_mps[-last:]))
+
+    def traffic(self) -> TrafficLog:
+        return TrafficLog(
+            t_s=np.arange(len(self.lane), dtype=np.float64) * SUMO_STEP_S,
+            start=np.array(self.start, dtype=np.int32),
+            vehicle=np.array(self.vehicle, dtype=np.int32),
+            poses_m=np.array(self.poses_m, dtype=np.float64).reshape(-1, 3),
+            kind=np.array(self.kind, dtype=np.uint8),
+        )
+
+
+class Pilot:
+    """Drives one tour in the running simulation. It holds what changes from step to step; results are in its log."""
+
+    def __init__(
+        self, network: RoadNetwork, graph: TourGraph, area: IntArray, tour: TourSpec, ego: EgoSpec, rng: np.random.Generator
+    ) -> None:
+        self._network, self._graph, self._area, self._tour, self._ego, self._rng = network, graph, area, tour, ego, rng
+        self._lane_number = {name: i for i, name in enumerate(network.lane_ids)}
+        self._lengths_m, self._length_factors = network.lane_lengths_m(), drawn_length_factors(network)
+        self._route: list[int] = []  # edges of the network
+        self._leads_on = True  # the present lane leads to the route's next edge
+        self._cap_mps, self._cap_offset_m = np.zeros(1), 0.0
+        self._log = DriveLog()
+
+    def drive(self, others: BackgroundTraffic) -> DriveLog:
+        """Until the tour is done."""
+        self._enter(others)
+        standing_steps = 0
+        while EGO in libsumo.vehicle.getIDList() and not self._is_done():
+            self._write_down(others)
+            if len(self._log.lane) == 1 or self._log.lane[-1] != self._log.lane[-2]:
+                self._look_ahead()
+            if self._turn_is_missed():
+                self._replan()
+            self._set_speed()
+            standing_steps = standing_steps + 1 if self._log.speed_mps[-1] < 0.1 else 0
+            if standing_steps * SUMO_STEP_S > STUCK_AFTER_S:
+                raise HippodromeError(
+                    f"edge {libsumo.vehicle.getRoadID(EGO)}: the ego has been standing for {STUCK_AFTER_S:.0f} s; "
+                    f"lower traffic.vehicles or check the junction behind this edge"
+                )
+            if len(self._log.lane) % REFILL_STEPS == 0:
+                others.refill(ego_on_road=True)
+            libsumo.simulationStep()
+        return self._log
+
+    def _enter(self, others: BackgroundTraffic) -> None:
+        """Lets traffic spread, then waits for the ego's place on the road."""
+        self._route = self._network_edges(plan_tour(self._graph, self._area, self._plan_length_m(), self._rng))
+        for step in range(round((WARM_UP_S + ENTRY_PATIENCE_S) / SUMO_STEP_S)):
+            if step == round(WARM_UP_S / SUMO_STEP_S):
+                add_vehicle(EGO, "ego", self._network, self._route, "base")
+            elif step % REFILL_STEPS == 0:
+                others.refill(ego_on_road=step * SUMO_STEP_S > WARM_UP_S)
+            libsumo.simulationStep()
+            if EGO in libsumo.vehicle.getIDList():
+                return
+        edge = self._network.edge_ids[self._route[0]]
+        raise HippodromeError(f"edge {edge}: no room for the ego within {ENTRY_PATIENCE_S:.0f} s; lower traffic.vehicles")
+
+    def _plan_length_m(self) -> float:
+        if self._tour.length_m is None and self._tour.duration_s is not None:
+            return self._tour.duration_s * float(self._network.speed_limit_mps.max()) + SPARE_M
+        return self._tour.planned_length_m() + SPARE_M
+
+    def _is_done(self) -> bool:
+        if self._tour.duration_s is not None and len(self._log.lane) * SUMO_STEP_S > self._tour.duration_s:
+            return True
+        by_time_only = self._tour.length_m is None and self._tour.duration_s is not None
+        return not by_time_only and libsumo.vehicle.getDistance(EGO) >= self._tour.planned_length_m()
+
+    def _write_down(self, others: BackgroundTraffic) -> None:
+        name = libsumo.vehicle.getLaneID(EGO)
+        lane = self._lane_number.get(name)
+        if lane is None:
+            raise HippodromeError(f"lane {name}: SUMO led the ego there though it is closed to passenger cars; check the network")
+        log = self._log
+        log.lane.append(lane)
+        log.position_m.append(libsumo.vehicle.getLanePosition(EGO) * float(self._length_factors[lane]))
+        log.speed_mps.append(libsumo.vehicle.getSpeed(EGO))
+        ids, poses, kinds = others.near(*libsumo.vehicle.getPosition(EGO))
+        log.vehicle.extend(ids)
+        log.poses_m.extend(poses)
+        log.kind.extend(kinds)
+        log.start.append(len(log.vehicle))
+
+    def _look_ahead(self) -> None:
+        """On a new lane: the comfortable speed along it and what follows."""
+        lane, onward = self._log.lane[-1], self._onward_edges()
+        pieces, _ = lane_pieces(self._network, self._log.lanes(SIGHT_BEHIND_STEPS))
+        here = pieces[-1]
+        pieces[-1] = Piece(lane, here.begin_m, float(self._lengths_m[lane]), here.side_step, here.speed_mps)
+        ahead = lanes_ahead(self._network, lane, onward, SIGHT_AHEAD_M)
+        self._cap_offset_m = float(piece_starts(pieces)[-2]) - here.begin_m - REAR_AXLE_TO_FRONT_M
+        pieces += [Piece(each, 0.0, float(self._lengths_m[each]), False, here.speed_mps) for each in ahead]
+        lanes = np.array([piece.lane for piece in pieces])[piece_of_samples(pieces)]
+        limit = self._network.speed_limit_mps[lanes]
+        self._cap_mps = comfortable_speed_mps(smooth_path(self._network, pieces), limit, self._ego)
+        on_road = not self._network.is_internal[lane]
+        self._leads_on = not on_road or not onward or bool(ways_to_edge(self._network, lane, onward[0]))
+
+    def _set_speed(self) -> None:
+        """No faster than what the rear axle's place on the path allows; SUMO adds right of way and the cars ahead."""
+        where = (self._log.position_m[-1] + self._cap_offset_m) / STEP_M
+        k = min(max(int(where), 0), len(self._cap_mps) - 1)
+        libsumo.vehicle.setSpeed(EGO, float(self._cap_mps[k]))
+
+    def _turn_is_missed(self) -> bool:
+        """On a lane that does not lead where the route goes, too near its end to change."""
+        if self._leads_on:
+            return False
+        left_m = float(self._lengths_m[self._log.lane[-1]]) - self._log.position_m[-1]
+        braking_m = self._log.speed_mps[-1] ** 2 / (2.0 * self._ego.decel_mps2)
+        return left_m < braking_m + LAST_CHANCE_M
+
+    def _replan(self) -> None:
+        """The rest of the tour anew, from where the present lane leads; with no such place SUMO must get the lane change done."""
+        number = {int(edge): k for k, edge in enumerate(self._graph.edges)}
+        lane = self._log.lane[-1]
+        after = [number.get(int(self._network.lane_edge[way[-1]]), -1) for way in ways_out(self._network, lane)]
+        reachable = sorted({edge for edge in after if edge >= 0})
+        if not reachable:
+            return
+        pieces, distance = lane_pieces(self._network, self._log.lanes())
+        edges = [number[edge] for edge in driven_edges(self._network, pieces) if edge in number]
+        visits = np.bincount(edges, minlength=len(self._graph.edges)).astype(np.int32)
+        start = min(reachable, key=lambda edge: (edge not in self._area, visits[edge]))
+        left_m = max(self._plan_length_m() - float(distance[-1]), SPARE_M)
+        rest = plan_tour(self._graph, self._area, left_m, self._rng, visits, start)
+        self._route = [int(self._network.lane_edge[lane]), *self._network_edges(rest)]
+        libsumo.vehicle.setRoute(EGO, [self._network.edge_ids[edge] for edge in self._route])
+        self._look_ahead()
+
+    def _onward_edges(self) -> list[int]:
+        """The route after the edge that the ego is on or has just left."""
+        return self._route[libsumo.vehicle.getRouteIndex(EGO) + 1 :]
+
+    def _network_edges(self, tour: IntArray) -> list[int]:
+        return [int(edge) for edge in self._graph.edges[tour]]

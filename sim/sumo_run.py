@@ -1,0 +1,104 @@
+"""One SUMO simulation at a time: libsumo's calls and complaints stop here."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+import libsumo
+import numpy as np
+
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.types import FloatArray, HippodromeError, IntArray
+from hippodrome.sim.tour import TourGraph
+from hippodrome.sim.traffic import KIND_SHARES, VEHICLE_SIZES_M, TrafficSpec, random_trip
+
+SUMO_STEP_S: Final = 0.1
+EGO: Final = "ego"
+REMOVE_AFTER_S: Final = 60  # vehicles blocked this long, in a knot that SUMO cannot undo, are taken off the road
+SIGHT_M: Final = 150.0  # vehicles farther from the ego are not logged
+
+
+@contextmanager
+def sumo_run(net_file: Path, vehicle_types: str, seed: int) -> Iterator[None]:
+    """Starts SUMO on a network in this process and closes it whatever happens."""
+    with tempfile.TemporaryDirectory() as folder:
+        types_file = Path(folder) / "types.add.xml"
+        types_file.write_text(vehicle_types, encoding="utf-8")
+        options = (
+            f"--net-file={net_file}",
+            f"--additional-files={types_file}",
+            f"--seed={seed % 2**31}",
+            f"--step-length={SUMO_STEP_S}",
+            f"--time-to-teleport={REMOVE_AFTER_S}",
+            "--time-to-teleport.remove",
+            "--max-depart-delay=5",
+            "--collision.action=none",
+            "--step-method.ballistic",
+            "--xml-validation=never",
+            "--no-step-log",
+            "--no-warnings",
+            "--duration-log.disable",
+        )
+        try:
+            libsumo.start(["sumo", *options])
+            yield
+        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+            raise HippodromeError(f"{net_file}: SUMO failed: {' '.join(str(error).split())}") from error
+        finally:
+            libsumo.close()
+
+
+class BackgroundTraffic:
+    """Keeps a number of vehicles on random trips, and tells where those near the ego are."""
+
+    def __init__(
+        self, spec: TrafficSpec, network: RoadNetwork, graph: TourGraph, area: IntArray, rng: np.random.Generator
+    ) -> None:
+        self._spec, self._network, self._graph, self._area, self._rng = spec, network, graph, area, rng
+        self._kind: list[int] = []  # of each vehicle sent so far, its identity being its number
+
+    def refill(self, ego_on_road: bool) -> None:
+        """Sends vehicles on their way until the wanted number is on the road or waits for room."""
+        there = libsumo.simulation.getMinExpectedNumber() - int(ego_on_road)
+        for _ in range(self._spec.vehicles - there):
+            number, kind = len(self._kind), int(self._rng.choice(len(KIND_SHARES), p=KIND_SHARES))
+            trip = random_trip(self._graph, self._area, self._rng)
+            add_vehicle(f"b{number}", f"kind{kind}", self._network, trip, "random_free")
+            self._kind.append(kind)
+
+    def near(self, x_m: float, y_m: float) -> tuple[list[int], list[tuple[float, float, float]], list[int]]:
+        """Identities, poses of the centres and kinds of the vehicles within ``SIGHT_M``."""
+        ids: list[int] = []
+        poses: list[tuple[float, float, float]] = []
+        kinds: list[int] = []
+        for name in libsumo.vehicle.getIDList():
+            if name == EGO:
+                continue
+            x, y = libsumo.vehicle.getPosition(name)
+            if (x - x_m) ** 2 + (y - y_m) ** 2 > SIGHT_M**2:
+                continue
+            number = int(name[1:])
+            heading = math.radians(90.0 - libsumo.vehicle.getAngle(name))
+            half = 0.5 * float(VEHICLE_SIZES_M[self._kind[number], 0])
+            ids.append(number)
+            poses.append((x - half * math.cos(heading), y - half * math.sin(heading), heading))
+            kinds.append(self._kind[number])
+        return ids, poses, kinds
+
+
+def add_vehicle(name: str, vehicle_type: str, network: RoadNetwork, edges: Sequence[int], depart_position: str) -> None:
+    """Puts a vehicle on a route of the network's edges as soon as there is room."""
+    libsumo.route.add(f"route-{name}", [network.edge_ids[edge] for edge in edges])
+    libsumo.vehicle.add(name, f"route-{name}", typeID=vehicle_type, departLane="best", departPos=depart_position)
+
+
+def drawn_length_factors(network: RoadNetwork) -> FloatArray:
+    """Metres as drawn per metre as SUMO counts them, for each lane: SUMO's ``length`` attribute is free to differ."""
+    counted = np.array([libsumo.lane.getLength(lane) for lane in network.lane_ids])
+    factors: FloatArray = network.lane_lengths_m() / np.maximum(counted, 1e-3)
+    return factors

@@ -91,7 +91,7 @@ def search_route(visits: Visits, network: RoadNetwork, config: RouteSearchConfig
             f"cognitive map: no route of this network is {track.arc[-1] * high:.0f} m long; check that it is the network that was driven"
         )
     through = route_kernel.backward(*arguments, config.margin_nats, survivors)
-    return _best_route(fine, track, log_scale, survivors, through)
+    return _best_route(fine, network.lane_lengths_m(), track, log_scale, survivors, through)
 
 
 def _kernel_costs(costs: SearchCosts, bin_m: float) -> tuple[float, ...]:
@@ -158,15 +158,20 @@ def _share_of_lane(fine: LaneGraph, coarse: LaneGraph) -> IntArray:
 
 
 def _best_route(
-    graph: LaneGraph, track: Track, log_scale: FloatArray, survivors: tuple[np.ndarray, ...], through: Float32Array
+    graph: LaneGraph,
+    lane_length_m: FloatArray,
+    track: Track,
+    log_scale: FloatArray,
+    survivors: tuple[np.ndarray, ...],
+    through: Float32Array,
 ) -> Route:
     row_start, bins, k, parent, score, offset, rest = survivors
     row = np.empty(len(track.arc), dtype=np.int64)
     row[-1] = row_start[-2] + np.argmax(score[row_start[-2] :])
     for t in range(len(row) - 1, 0, -1):
         row[t - 1] = parent[row[t]]
-    position = graph.position_m[bins[row]] + rest[row]
     lane = graph.lane[bins[row]]
+    position = np.clip(graph.position_m[bins[row]] + rest[row], 0.0, lane_length_m[lane])
     return Route(
         graph=graph,
         track=track,

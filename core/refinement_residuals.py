@@ -1,0 +1,157 @@
+"""Residuals of the default refinement over (x, y, heading, log scale) per visit and the gyro's gain and bias.
+
+Residuals are whitened; each group holds its Jacobians by block: of the visit, of the next visit, of the border (gain, bias).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hippodrome.core.chain_solver import ChainSystem
+from hippodrome.core.noise_estimation import Noise
+from hippodrome.core.se2 import between, wrap
+from hippodrome.core.types import Edges, FloatArray, IntArray, Visits
+
+GAIN_SIGMA = 0.05  # prior: cheap gyros are calibrated to a few percent
+BIAS_SIGMA_RADPS = 0.02  # prior: about 1 deg/s
+GEMAN_MCCLURE = 3.0  # sigmas at which a closure has lost three quarters of its weight
+HUBER = 1.5  # sigmas
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    poses: FloatArray  # (S, 3) network frame, m, m, rad
+    log_scale: FloatArray  # (S,) ln(metres per map unit)
+    gyro: FloatArray  # (2,) gain error, bias (rad/s): turned = (1 + gain) measured + bias dt
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Targets:
+    """Where on the road each visit is held."""
+
+    points_m: FloatArray  # (S, 2)
+    heading_rad: FloatArray  # (S,) of the lane
+    on_road: FloatArray  # (S,) 1, or 0 where nothing vouches for the road
+    along_sigma_m: float  # inf: point to line
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """N whitened residuals of M components, already multiplied by their robust weights' roots."""
+
+    residual: FloatArray  # (N, M)
+    here: FloatArray  # (N, M, 4)
+    weight: FloatArray  # (N, M) robust weights
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairGroup(Group):
+    there: FloatArray  # (N, M, 4)
+    border: FloatArray  # (N, M, 2)
+
+
+def odometry(state: State, visits: Visits, noise: Noise) -> PairGroup:
+    """Components: along, across, heading, log scale, between each visit and the next (N = S - 1)."""
+    a, b = state.poses[:-1], state.poses[1:]
+    motion, dt = visits.motion[1:], np.diff(visits.t_s)
+    seen, metres = between(a, b), np.exp(state.log_scale[:-1])[:, None] * motion[:, :2]
+    turn = wrap(b[:, 2] - a[:, 2] - (1.0 + state.gyro[0]) * motion[:, 2] - state.gyro[1] * dt)
+    residual = np.column_stack([seen[:, :2] - metres, turn, np.diff(state.log_scale)])
+    here, there = _relative_jacobians(a, seen)
+    here[:, :2, 3] = -metres
+    here[:, 3, 3], there[:, 3, 3] = -1.0, 1.0
+    border = np.zeros((len(a), 4, 2))
+    border[:, 2, 0], border[:, 2, 1] = -motion[:, 2], -dt
+    root = 1.0 / noise.step_sigmas(np.hypot(metres[:, 0], metres[:, 1]))
+    ones = np.ones_like(residual)
+    return PairGroup(residual * root, here * root[..., None], ones, there * root[..., None], border * root[..., None])
+
+
+def road(state: State, targets: Targets, noise: Noise) -> Group:
+    """Components: across the lane and lane heading (Huber), along the lane."""
+    cos, sin = np.cos(targets.heading_rad), np.sin(targets.heading_rad)
+    off = state.poses[:, :2] - targets.points_m
+    across = (-sin * off[:, 0] + cos * off[:, 1]) / noise.lateral_m
+    along = (cos * off[:, 0] + sin * off[:, 1]) / targets.along_sigma_m
+    turned = wrap(state.poses[:, 2] - targets.heading_rad) / noise.lane_heading_rad
+    residual = np.column_stack([across, turned, along])
+    here = np.zeros((len(off), 3, 4))
+    here[:, 0, 0], here[:, 0, 1] = -sin / noise.lateral_m, cos / noise.lateral_m
+    here[:, 1, 2] = 1.0 / noise.lane_heading_rad
+    here[:, 2, 0], here[:, 2, 1] = cos / targets.along_sigma_m, sin / targets.along_sigma_m
+    weight = np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12))
+    weight[:, 2] = 1.0
+    weight *= targets.on_road[:, None]
+    root = np.sqrt(weight)
+    return Group(residual * root, here * root[..., None], weight)
+
+
+def closures(state: State, edges: Edges, noise: Noise) -> PairGroup:
+    """Closure edges, Geman-McClure weighted as a whole; source and target index visits."""
+    a, b = state.poses[edges.source], state.poses[edges.target]
+    scale = np.exp(state.log_scale[edges.source])[:, None]
+    seen, metres = between(a, b), scale * edges.motion[:, :2]
+    residual = np.column_stack([seen[:, :2] - metres, wrap(seen[:, 2] - edges.motion[:, 2])])
+    here, there = _relative_jacobians(a, seen)
+    here, there = here[:, :3], there[:, :3]
+    here[:, :2, 3] = -metres
+    root = 1.0 / (noise.closure_factor * np.column_stack([scale * edges.sigma[:, :2], edges.sigma[:, 2]]))
+    sq = np.sum((residual * root) ** 2, axis=1)
+    weight = (GEMAN_MCCLURE**2 / (GEMAN_MCCLURE**2 + sq)) ** 2
+    root = root * np.sqrt(weight)[:, None]
+    border = np.zeros((len(a), 3, 2))
+    return PairGroup(residual * root, here * root[..., None], np.repeat(weight[:, None], 3, 1), there * root[..., None], border)
+
+
+def normal_equations(
+    state: State, steps: PairGroup, roads: Group, tied: PairGroup, source: IntArray, target: IntArray
+) -> ChainSystem:
+    """J^T J and -J^T r; the coupling between the two ends of a closure is left out (see ``coupling``)."""
+    count = len(state.poses)
+    diagonal, rhs = _squares(roads.here, roads.residual)
+    here, rhs_here = _squares(steps.here, steps.residual)
+    there, rhs_there = _squares(steps.there, steps.residual)
+    diagonal[:-1] += here
+    diagonal[1:] += there
+    rhs[:-1] += rhs_here
+    rhs[1:] += rhs_there
+    for index, jacobian in ((source, tied.here), (target, tied.there)):
+        blocks, sides = _squares(jacobian, tied.residual)
+        np.add.at(diagonal, index, blocks)
+        np.add.at(rhs, index, sides)
+    border = np.zeros((count, 4, 2))
+    border[:-1] += np.einsum("nmi,nmg->nig", steps.here, steps.border)
+    border[1:] += np.einsum("nmi,nmg->nig", steps.there, steps.border)
+    prior = np.array([GAIN_SIGMA, BIAS_SIGMA_RADPS]) ** -2.0
+    return ChainSystem(
+        diagonal=diagonal,
+        upper=np.einsum("nmi,nmj->nij", steps.here, steps.there),
+        border=border,
+        corner=np.einsum("nmg,nmh->gh", steps.border, steps.border) + np.diag(prior),
+        rhs=rhs,
+        rhs_border=-np.einsum("nmg,nm->g", steps.border, steps.residual) - prior * state.gyro,
+    )
+
+
+def moved(state: State, step: FloatArray, gyro_step: FloatArray) -> State:
+    """The state after a Gauss-Newton step (S, 4), (2,)."""
+    poses = state.poses + step[:, :3]
+    poses[:, 2] = wrap(poses[:, 2])
+    return State(poses, state.log_scale + step[:, 3], state.gyro + gyro_step)
+
+
+def _squares(jacobian: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return np.einsum("nmi,nmj->nij", jacobian, jacobian), -np.einsum("nmi,nm->ni", jacobian, residual)
+
+
+def _relative_jacobians(a: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Derivatives (N, 4, 4) of ``between(a, b)`` by a and by b, as far as (x, y, heading) go."""
+    cos, sin = np.cos(a[:, 2]), np.sin(a[:, 2])
+    here, there = np.zeros((len(a), 4, 4)), np.zeros((len(a), 4, 4))
+    there[:, 0, 0], there[:, 0, 1], there[:, 1, 0], there[:, 1, 1] = cos, sin, -sin, cos
+    here[:, :2, :2] = -there[:, :2, :2]
+    here[:, 0, 2], here[:, 1, 2] = seen[:, 1], -seen[:, 0]
+    here[:, 2, 2], there[:, 2, 2] = -1.0, 1.0
+    return here, there

@@ -50,7 +50,7 @@ class Mapper:
         """One observation: path integration, and a visit where a view is due."""
         self._step_state = view_step.advance(self._step_state, observation, self._config.view_step)
         self._integrate_paths(observation)
-        if observation.frame is None or not view_step.is_due(self._step_state, self._config.view_step):
+        if not view_step.is_due(self._step_state, self._config.view_step) or observation.frame is None:
             return
         recognitions = self._visit(observation.t_s, observation.frame)
         self._close_loops(recognitions)

@@ -29,7 +29,7 @@ class PlaceMemoryConfig:
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
     closure_margin: float = 2.2  # filtered; a wrong closure feeds the cells that later views are compared with
     waiting_views: int = 16  # before a view is stored: the loop around the smallest block is longer
-    support_z: float = 1.5  # what a view must add on its own to be recognised by its successors' evidence
+    support_z: float = 3.0  # what the view itself must say: the filter runs on past a junction, and back before one
     column_rad: float = 0.1  # heading per column of shift, between the mean (fov / columns) and the centre of a 90 deg image
 
     def __post_init__(self) -> None:
@@ -107,14 +107,14 @@ class PlaceMemory:
 
     def _trace(self, best: Peak) -> list[Recognition]:
         """The latest view's recognition, and those of waiting views on the path that led to it."""
-        found, cell, latest = [], best.cell, True
+        found, cell = [], best.cell
         for view in reversed(self._waiting):
-            if cell < 0 or cell >= len(view.evidence.z_score) or view.cell >= 0:
+            known = 0 <= cell < len(view.evidence.z_score) and view.cell < 0
+            if not known or view.evidence.z_score[cell] < self._config.support_z:
                 break
-            if latest or view.evidence.z_score[cell] >= self._config.support_z:
-                view.cell = cell
-                found.append(self._recognition(view, best.margin))
-            cell, latest = int(view.evidence.predecessor[cell]), False
+            view.cell = cell
+            found.append(self._recognition(view, best.margin))
+            cell = int(view.evidence.predecessor[cell])
         return found[::-1]
 
     def _recognition(self, view: _Waiting, margin: float) -> Recognition:

@@ -106,8 +106,10 @@ class FlatRenderer(pyrender.renderer.Renderer):  # type: ignore[misc]  # pyrende
     """Draws the tiles of ``pyrender.Scene`` front to back; tells tiles, moving things and the sky apart by the node's name."""
 
     def __init__(self, width: int, height: int, haze: FloatArray, extinction_per_m: float, fine_range_m: float) -> None:
+        self._main_fb: int | None
         super().__init__(width, height)
         self.haze, self.extinction_per_m, self.fine_range_m = haze, extinction_per_m, fine_range_m
+        self._program: int | None
         self._program, self._uniform = _compile()
         self._tiles: list[FlatPrimitive] = []
         self._bounds_m = np.zeros((0, 4))
@@ -127,7 +129,7 @@ class FlatRenderer(pyrender.renderer.Renderer):  # type: ignore[misc]  # pyrende
         self._bounds_m = np.array(corners).reshape(-1, 4)
 
     def _sorted_mesh_nodes(self, scene: Any) -> list[tuple[FlatPrimitive, bool]]:
-        """Visible tiles, and whether near enough for fine detail; nearest first, so that the depth test hides the far ones early."""
+        """Visible tiles, and whether near enough for fine detail; nearest first, so that the depth test hides much early."""
         pose = scene.get_pose(scene.main_camera_node)
         camera = scene.main_camera_node.camera
         seen, distance_m = visible_tiles(self._bounds_m, pose[:2, 3], -pose[:2, 2], camera.half_fov_rad, camera.zfar)

@@ -9,7 +9,7 @@ import numpy as np
 os.environ.setdefault("PYOPENGL_PLATFORM", "egl")  # off-screen without a display server; a user's own choice stays
 os.environ.setdefault("LP_NUM_THREADS", "0")  # llvmpipe: parallelism is one process per chunk of the drive, not threads
 if not hasattr(np, "infty"):
-    np.inf = np.inf  # type: ignore[attr-defined]  # pyrender 0.1.45 was written for numpy 1
+    setattr(np, "infty", np.inf)  # noqa: B010  # pyrender 0.1.45 was written for numpy 1
 
 import OpenGL.GL as gl
 import pyrender

@@ -50,8 +50,8 @@ def _of_kind(kind: int, poses_m: FloatArray, ids: IntArray) -> Mesh:
     paint = PAINTS[(ids.astype(np.int64) * 2654435761 >> 8) % len(PAINTS)]  # Knuth's multiplicative hash: neighbours differ
     albedo = np.where(painted[None, :, None], paint[:, None, :], template.albedo[None])
     return Mesh(
-        vertices_m=_flat(turned(template.vertices_m[None], poses_m[:, :2], poses_m[:, 2])),
-        normals=_flat(turned(template.normals[None], np.zeros((k, 2)), poses_m[:, 2])),
+        vertices_m=_flat(turned(template.vertices_m[None].astype(np.float64), poses_m[:, :2], poses_m[:, 2])),
+        normals=_flat(turned(template.normals[None].astype(np.float64), np.zeros((k, 2)), poses_m[:, 2])),
         albedo=_flat(albedo),
         surface=np.tile(template.surface, k),
         faces=(np.arange(k)[:, None, None] * n + template.faces).reshape(-1, 3).astype(np.int32),

@@ -38,7 +38,7 @@ def _tiles(bold: Mesh, fine: Mesh, conditions: Conditions) -> tuple[Tile, ...]:
     rgb = colour(mesh, conditions, light_of(conditions))
     is_fine = np.arange(len(mesh.faces)) >= len(bold.faces)
     tile = _tile_of_faces(mesh.vertices_m[mesh.faces].mean(axis=1)[:, :2])
-    order = np.lexsort((is_fine, tile))
+    order = np.lexsort((is_fine, tile)).astype(np.int32)
     starts = np.flatnonzero(np.diff(tile[order], prepend=-1))
     return tuple(_tile(mesh, rgb, rows, is_fine) for rows in np.split(order, starts[1:]))
 
@@ -57,4 +57,5 @@ def _tile_of_faces(centre_m: FloatArray) -> IntArray:
     """Number of the tile (m,) that holds each point (m, 2), counted row by row."""
     cell = np.floor(centre_m / TILE_M).astype(np.int64)
     cell -= cell.min(axis=0)
-    return (cell[:, 1] * (cell[:, 0].max() + 1) + cell[:, 0]).astype(np.int32)
+    number: IntArray = (cell[:, 1] * (cell[:, 0].max() + 1) + cell[:, 0]).astype(np.int32)
+    return number

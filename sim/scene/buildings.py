@@ -1,4 +1,4 @@
-"""Houses, barns, blocks, halls, churches and silos. Their massing (size, yaw, distance, height, roof) is what tells places apart."""
+"""Houses, barns, blocks, halls, churches, silos. Their massing (size, yaw, distance, height, roof) tells places apart."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hippodrome.core.types import FloatArray, IntArray
 from hippodrome.sim.scene.mesh import Mesh, Surface, boxes, merge, placed, polygons, turned
 from hippodrome.sim.scene.placement import Border, Shapes, clear_of, rectangles, spread
 
-# Kind: length, width, wall height [m] from..to, roof pitch [deg] from..to (0: flat), distance of the front from the road [m] from..to.
+# From..to of length, width, wall height [m], roof pitch [deg] (0: flat), distance of the front from the road [m].
 KINDS: Final = np.array(
     [
         [8.0, 14.0, 7.0, 10.0, 3.0, 6.2, 30.0, 50.0, 3.5, 12.0],  # 0 house
@@ -73,13 +73,14 @@ class Buildings:
         return rectangles(self.centre_m, self.yaw_rad, self.size_m[:, 0], self.size_m[:, 1])
 
 
-def place_buildings(border: Border, town_share: FloatArray, roads: Shapes, rng: np.random.Generator) -> Buildings:
-    """Two rows along the roads; ``town_share`` (B,) mixes the rural kinds with those of a town."""
+def place_buildings(border: Border, town_share: FloatArray, roads: Shapes, fields: Shapes, rng: np.random.Generator) -> Buildings:
+    """Two rows along the roads, off the fields; ``town_share`` (B,) mixes the rural kinds with those of a town."""
     sparse = 1.0 + 0.5 * (1.0 - town_share)
     front = _propose(border, town_share, spacing_m=10.0 * sparse, behind_m=(0.0, 4.0), stray_rad=0.12, rng=rng)
     back = _propose(border, town_share, spacing_m=14.0 * sparse, behind_m=(14.0, 48.0), stray_rad=0.6, rng=rng)
     proposed = join([front, back])
-    proposed = proposed.select(clear_of(proposed.footprints(), roads, ROAD_CLEARANCE_M))
+    footprints = proposed.footprints()
+    proposed = proposed.select(clear_of(footprints, roads, ROAD_CLEARANCE_M) & clear_of(footprints, fields, GAP_M))
     return proposed.select(spread(proposed.footprints(), GAP_M))
 
 
@@ -90,7 +91,7 @@ def join(groups: list[Buildings]) -> Buildings:
 def _propose(
     border: Border,
     town_share: FloatArray,
-    spacing_m: float,
+    spacing_m: FloatArray,
     behind_m: tuple[float, float],
     stray_rad: float,
     rng: np.random.Generator,
@@ -118,7 +119,7 @@ def _propose(
         hip=np.where(np.isin(kind, (HOUSE, BUNGALOW)) & (rng.random(k) < 0.3), rng.uniform(0.5, 1.0, k), 0.0),
         facade=np.clip(facade * rng.uniform(0.88, 1.1, (k, 1)), 0.0, 1.0),
         roof=ROOFS[rng.integers(len(ROOFS), size=k)] * rng.uniform(0.85, 1.15, (k, 1)),
-        glazing=np.where((kind >= BLOCK) & (rng.random(k) < 0.5), 0.0, rng.uniform(2.2, 3.6, k)),
+        glazing=np.where(np.isin(kind, (BLOCK, HALL)) & (rng.random(k) < 0.5), 0.0, rng.uniform(2.2, 3.6, k)),
     )
 
 
@@ -199,7 +200,7 @@ def _towers(churches: Buildings) -> Mesh:
     offset = np.stack([0.5 * (churches.size_m[:, 0] - side), np.zeros(k), np.zeros(k)], axis=1)
     centre = turned(offset[:, None, :], churches.centre_m, churches.yaw_rad)[:, 0]
     tower = boxes(centre[:, :2], churches.yaw_rad, np.stack([1.02 * side, 1.02 * side, height], axis=1), churches.facade)
-    x = 0.58 * side
+    x = 0.53 * side
     foot = np.stack(
         [np.stack([offset[:, 0] + sx * x, sy * x, height], 1) for sx, sy in ((1, -1), (1, 1), (-1, 1), (-1, -1))], axis=1
     )

@@ -31,7 +31,7 @@ def apply_camera(frame: Frame, conditions: Conditions, rng: np.random.Generator)
     """The frame as a worse camera would deliver it: smeared, amplified, bent by gamma, noisy. Shape (H, W, 3) stays."""
     image = _smear(frame, conditions.motion_blur)
     if conditions.gain != 1.0 or conditions.gamma != 1.0:
-        image = cv2.LUT(image, _response(conditions.gain, conditions.gamma))
+        image = _response(conditions.gain, conditions.gamma)[image]
     if conditions.noise_sigma > 0.0:
         noise = rng.standard_normal(image.shape, dtype=np.float32) * np.float32(conditions.noise_sigma)
         image = np.clip(np.rint(image + noise), 0, 255).astype(np.uint8)
@@ -43,8 +43,7 @@ def _smear(frame: Frame, share: float) -> Frame:
     length = round(share * frame.shape[1])
     if length < 2:
         return frame
-    blurred: Frame = cv2.blur(frame, (length, 1), borderType=cv2.BORDER_REPLICATE)
-    return blurred
+    return np.asarray(cv2.blur(frame, (length, 1), borderType=cv2.BORDER_REPLICATE), dtype=np.uint8)
 
 
 def _response(gain: float, gamma: float) -> Frame:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 import shapely
@@ -18,6 +19,7 @@ STEEL, WOOD, DARK = np.array([0.62, 0.64, 0.66]), np.array([0.42, 0.33, 0.25]), 
 RED, WHITE, YELLOW, BLUE, GREEN = (
     np.array(c) for c in ([0.78, 0.10, 0.10], [0.94, 0.94, 0.92], [0.95, 0.78, 0.12], [0.12, 0.30, 0.62], [0.10, 0.46, 0.26])
 )
+Maker: TypeAlias = Callable[[np.random.Generator, FloatArray, FloatArray], Mesh]  # at centre (1, 2) and yaw (1,)
 STRAW: Final = np.array([0.80, 0.70, 0.42])
 
 
@@ -65,7 +67,7 @@ def _signals(signals_m: FloatArray, left_hand: bool, roads: Shapes, rng: np.rand
     heading = signals_m[:, 2]
     outward = (1.0 if left_hand else -1.0) * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     offset = np.full(k, np.nan)
-    for shift_m in np.arange(1.0, 12.0, 0.5):
+    for shift_m in np.arange(0.0, 12.0, 0.5):
         free = np.isnan(offset) & clear_of(shapely.points(signals_m[:, :2] + shift_m * outward), roads, POST_CLEARANCE_M)
         offset[free] = shift_m
     placed = np.flatnonzero(~np.isnan(offset))
@@ -82,8 +84,8 @@ def _copies(template: Mesh, foot_m: FloatArray, yaw_rad: FloatArray) -> Mesh:
 
 
 def _sprinkled(
-    make, border: Border, spacing_m: float, setback_m: float, roads: Shapes, taken: Shapes, rng: np.random.Generator
-) -> Mesh:  # type: ignore[no-untyped-def]
+    make: Maker, border: Border, spacing_m: float, setback_m: float, roads: Shapes, taken: Shapes, rng: np.random.Generator
+) -> Mesh:
     site = border.draw(spacing_m, rng)
     k = len(site.length_m)
     centre = site.point_m + site.outward * setback_m

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from hippodrome.core.types import FloatArray
-from hippodrome.sim.scene.mesh import Mesh, Surface, boxes, merge, polygons, turned
+from hippodrome.sim.scene.mesh import Mesh, Surface, boxes, merge, placed, polygons, turned
 from hippodrome.sim.scene.placement import Border, Shapes, clear_of, quilt, rectangles, spread
 
 CELL_M: Final = 80.0  # as the tiles, so that no cell straddles two
@@ -23,8 +24,11 @@ STRAW: Final = np.array([0.50, 0.50, 0.27])
 FIELDS: Final = np.array([[0.74, 0.64, 0.36], [0.42, 0.38, 0.24], [0.42, 0.33, 0.25], [0.44, 0.54, 0.24], [0.70, 0.66, 0.16]])
 ROWS: Final = np.array([[0.66, 0.55, 0.28], [0.30, 0.48, 0.20], [0.34, 0.26, 0.19], [0.38, 0.50, 0.20], [0.62, 0.62, 0.20]])
 PATCHES: Final = np.array([[0.28, 0.42, 0.16], [0.46, 0.52, 0.24], [0.54, 0.52, 0.30], [0.24, 0.36, 0.15], [0.46, 0.40, 0.28]])
+FIELD_GAP_M: Final = 55.0  # of country road side per proposed field; about half find room
+FENCED_SHARE: Final = 0.45
+POST_GAP_M: Final = 2.5
 ROW_M: Final = 2.4  # between rows
-FENCE_WOOD: Final = np.array([0.46, 0.38, 0.29])
+WOOD: Final = np.array([0.46, 0.38, 0.29])
 
 
 def ground_mesh(road_points_m: FloatArray, rng: np.random.Generator) -> Mesh:
@@ -64,59 +68,68 @@ def patch_mesh(border: Border, rng: np.random.Generator) -> Mesh:
     return polygons(turned(local, centre, site.inward_yaw_rad()), albedo, Surface.GRASS)
 
 
-def field_mesh(border: Border, roads: Shapes, houses: Shapes, rng: np.random.Generator) -> tuple[Mesh, Mesh]:
-    """Fields (bold), their rows and fences (fine), wherever there is room."""
-    site = border.draw(16.0, rng)
+@dataclass(frozen=True, slots=True, eq=False)
+class Fields:
+    """k rectangular fields, their front (+y) to the road."""
+
+    centre_m: FloatArray  # (k, 2)
+    yaw_rad: FloatArray  # (k,)
+    length_m: FloatArray  # (k,) along the road
+    width_m: FloatArray  # (k,)
+
+    def select(self, rows: np.ndarray) -> Fields:
+        return Fields(self.centre_m[rows], self.yaw_rad[rows], self.length_m[rows], self.width_m[rows])
+
+    def footprints(self) -> Shapes:
+        return rectangles(self.centre_m, self.yaw_rad, self.length_m, self.width_m)
+
+
+def place_fields(border: Border, town_share: FloatArray, roads: Shapes, rng: np.random.Generator) -> Fields:
+    """Fields come first, as they did in history; houses fill what is left."""
+    site = border.draw(FIELD_GAP_M / np.maximum(1.0 - town_share, 0.05), rng)
     k = len(site.length_m)
-    length, width = rng.uniform(18.0, 70.0, k), rng.uniform(14.0, 45.0, k)
-    centre = site.point_m + site.outward * (rng.uniform(2.5, 30.0, k) + 0.5 * width)[:, None]
-    yaw = site.inward_yaw_rad() + rng.normal(0.0, 0.06, k)
-    shapes = rectangles(centre, yaw, length, width)
-    free = np.flatnonzero(clear_of(shapes, roads, 1.6) & clear_of(shapes, houses, 1.0))
-    free = free[spread(shapes[free], 2.0)]
+    length, width = rng.uniform(18.0, 60.0, k), rng.uniform(14.0, 40.0, k)
+    centre = site.point_m + site.outward * (rng.uniform(2.5, 9.0, k) + 0.5 * width)[:, None]
+    proposed = Fields(centre, site.inward_yaw_rad() + rng.normal(0.0, 0.06, k), length, width)
+    proposed = proposed.select(clear_of(proposed.footprints(), roads, 1.6))
+    return proposed.select(spread(proposed.footprints(), 2.0))
+
+
+def field_mesh(fields: Fields, rng: np.random.Generator) -> tuple[Mesh, Mesh]:
+    """Fields (bold), their rows and fences (fine)."""
+    k = len(fields.yaw_rad)
     kind = rng.integers(len(FIELDS), size=k)
     tone = rng.uniform(0.9, 1.1, (k, 1))
-    base = _sheets(
-        centre[free], yaw[free], length[free], width[free], np.zeros(len(free)), FIELD_Z_M, (FIELDS[kind] * tone)[free]
-    )
-    rows = np.floor(width[free] / ROW_M).astype(np.int64)
-    owner = np.repeat(free, rows)
+    base = _sheets(fields, np.zeros(k), FIELD_Z_M, FIELDS[kind] * tone)
+    rows = np.floor(fields.width_m / ROW_M).astype(np.int64)
+    owner = np.repeat(np.arange(k), rows)
     number = np.arange(len(owner)) - np.repeat(np.cumsum(rows) - rows, rows)
-    offset = (number + 0.5) * ROW_M - 0.5 * width[owner]
-    stripe = _sheets(
-        centre[owner], yaw[owner], length[owner], np.full(len(owner), 0.45 * ROW_M), offset, ROW_Z_M, (ROWS[kind] * tone)[owner]
-    )
-    fenced = free[rng.random(len(free)) < 0.45]
-    return base, merge([stripe, _fences(centre[fenced], yaw[fenced], length[fenced] + 1.2, width[fenced] + 1.2)])
+    offset = (number + 0.5) * ROW_M - 0.5 * fields.width_m[owner]
+    narrow = replace(fields.select(owner), width_m=np.full(len(owner), 0.45 * ROW_M))
+    stripes = _sheets(narrow, offset, ROW_Z_M, (ROWS[kind] * tone)[owner])
+    return base, merge([stripes, _fences(fields.select(rng.random(k) < FENCED_SHARE))])
 
 
-def _sheets(
-    centre_m: FloatArray,
-    yaw_rad: FloatArray,
-    length_m: FloatArray,
-    width_m: FloatArray,
-    offset_m: FloatArray,
-    z_m: float,
-    albedo: FloatArray,
-) -> Mesh:
+def _sheets(fields: Fields, offset_m: FloatArray, z_m: float, albedo: FloatArray) -> Mesh:
     """Flat rectangles (k,), shifted along their own y axis."""
-    x = 0.5 * length_m[:, None] * np.array([-1, 1, 1, -1])
-    y = 0.5 * width_m[:, None] * np.array([-1, -1, 1, 1]) + offset_m[:, None]
-    return polygons(turned(np.stack([x, y, np.full_like(x, z_m)], axis=-1), centre_m, yaw_rad), albedo, Surface.CROP)
+    x = 0.5 * fields.length_m[:, None] * np.array([-1, 1, 1, -1])
+    y = 0.5 * fields.width_m[:, None] * np.array([-1, -1, 1, 1]) + offset_m[:, None]
+    local = np.stack([x, y, np.full_like(x, z_m)], axis=-1)
+    return placed(local[:, None], fields.centre_m, fields.yaw_rad, albedo, Surface.CROP)
 
 
-def _fences(centre_m: FloatArray, yaw_rad: FloatArray, length_m: FloatArray, width_m: FloatArray) -> Mesh:
-    """Two rails and posts along the front of each field (its own +y side, towards the road)."""
-    k = len(centre_m)
-    front = np.stack([np.zeros(k), 0.5 * width_m], axis=1)
+def _fences(fields: Fields) -> Mesh:
+    """Two rails and posts along the front of each field."""
+    k, front = len(fields.yaw_rad), 0.5 * fields.width_m + 0.6
     rails = []
     for z_m in (0.45, 0.90):
-        foot = turned(np.concatenate([front, np.full((k, 1), z_m)], 1)[:, None], centre_m, yaw_rad)[:, 0]
-        rails.append(boxes(foot, yaw_rad, np.stack([length_m, np.full(k, 0.05), np.full(k, 0.13)], axis=1), FENCE_WOOD))
-    posts = np.floor(length_m / 2.5).astype(np.int64)
+        foot = turned(np.stack([0.0 * front, front, np.full(k, z_m)], axis=1)[:, None], fields.centre_m, fields.yaw_rad)[:, 0]
+        rails.append(boxes(foot, fields.yaw_rad, np.stack([fields.length_m, np.full(k, 0.05), np.full(k, 0.13)], axis=1), WOOD))
+    posts = np.floor(fields.length_m / POST_GAP_M).astype(np.int64)
     owner = np.repeat(np.arange(k), posts)
     number = np.arange(len(owner)) - np.repeat(np.cumsum(posts) - posts, posts)
-    x = (number + 0.5) * 2.5 - 0.5 * length_m[owner]
-    foot = turned(np.stack([x, front[owner, 1], np.zeros(len(x))], axis=1)[:, None], centre_m[owner], yaw_rad[owner])[:, 0]
-    post = boxes(foot[:, :2], yaw_rad[owner], np.tile([0.12, 0.12, 1.15], (len(x), 1)), 0.9 * FENCE_WOOD)
+    x = (number + 0.5) * POST_GAP_M - 0.5 * fields.length_m[owner]
+    local = np.stack([x, front[owner], np.zeros(len(x))], axis=1)[:, None]
+    foot = turned(local, fields.centre_m[owner], fields.yaw_rad[owner])[:, 0]
+    post = boxes(foot[:, :2], fields.yaw_rad[owner], np.tile([0.12, 0.12, 1.15], (len(x), 1)), 0.9 * WOOD)
     return merge([*rails, post])

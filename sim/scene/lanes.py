@@ -47,13 +47,14 @@ class Pieces:
         """Unit normal (P, 2) of the piece itself."""
         step = self.end_m - self.start_m
         normal = np.stack([-step[:, 1], step[:, 0]], axis=1)
-        return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+        unit: FloatArray = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+        return unit
 
 
 def cut_lanes(network: RoadNetwork, origin_m: FloatArray) -> Pieces:
     """All lanes, internal ones included, in pieces of at most ``PIECE_M``, relative to the origin."""
     counts = np.diff(network.point_start)
-    owner = np.repeat(np.arange(network.lane_count), counts)
+    owner = np.repeat(np.arange(network.lane_count, dtype=np.int32), counts)
     points = network.points_m - origin_m
     normal = _mitred_normals(points, owner)
     first = np.flatnonzero(owner[:-1] == owner[1:])

@@ -36,10 +36,12 @@ TINTS: Final[dict[str, dict[Surface, tuple[float, tuple[float, float, float]]]]]
 def light_of(conditions: Conditions) -> Light:
     """Sun and sky radiance; clouds and dusk take from the sun first."""
     azimuth, elevation = np.radians(conditions.sun_azimuth_deg), np.radians(conditions.sun_elevation_deg)
-    direction = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+    direction: FloatArray = np.array(
+        [np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)]
+    )
     low = np.exp(-np.sin(elevation) / 0.15)  # the low sun's light is reddened and dimmed on its long way through the air
-    colour = np.array([1.0, 0.96 - 0.25 * low, 0.88 - 0.5 * low])
-    sun = 0.95 * (1.0 - 0.4 * low) * (1.0 - conditions.overcast) * (1.0 - 0.95 * conditions.dusk) * colour
+    colour: FloatArray = np.array([1.0, 0.96 - 0.25 * low, 0.88 - 0.5 * low])
+    sun: FloatArray = 0.95 * (1.0 - 0.4 * low) * (1.0 - conditions.overcast) * (1.0 - 0.95 * conditions.dusk) * colour
     day = 1.0 - 0.72 * conditions.dusk
     clear, cloudy = np.array([0.34, 0.39, 0.47]), np.array([0.60, 0.61, 0.62])
     sky = day * ((1.0 - conditions.overcast) * clear + conditions.overcast * cloudy)
@@ -73,7 +75,7 @@ def colour(mesh: Mesh, conditions: Conditions, light: Light) -> UInt8Array:
 def _lit_windows(mesh: Mesh, conditions: Conditions) -> np.ndarray:
     """Windows with a light behind them: a share that grows with dusk, told apart by the window's own shade of glass."""
     lottery = np.floor(mesh.albedo[:, 2] * 4096.0).astype(np.int64) * 2654435761 % 1000 / 1000.0
-    return (mesh.surface == Surface.WINDOW) & (lottery < 0.5 * conditions.dusk)
+    return np.asarray((mesh.surface == Surface.WINDOW) & (lottery < 0.5 * conditions.dusk))
 
 
 def extinction_per_m(conditions: Conditions) -> float:
@@ -90,7 +92,8 @@ def _horizon(conditions: Conditions) -> FloatArray:
     clear, cloudy, dusk = np.array([0.80, 0.87, 0.93]), np.array([0.80, 0.81, 0.82]), np.array([0.50, 0.42, 0.45])
     grey = 1.0 if conditions.fog_visibility_m is not None else conditions.overcast
     day = (1.0 - grey) * clear + grey * cloudy
-    return (1.0 - conditions.dusk) * day + conditions.dusk * dusk * day / clear
+    horizon: FloatArray = (1.0 - conditions.dusk) * day + conditions.dusk * dusk * day / clear
+    return horizon
 
 
 def sky_dome(conditions: Conditions) -> Tile:
@@ -119,4 +122,5 @@ def _sky(ray: FloatArray, conditions: Conditions) -> FloatArray:
         zenith = (1.0 - veil) * zenith + veil * horizon
     height = (np.clip(ray[:, 2:], 0.0, 1.0)) ** 0.6
     glow = np.clip(ray @ light_of(conditions).sun_direction, 0.0, 1.0)[:, None] ** 12 * (1.0 - conditions.overcast)
-    return np.clip((1.0 - height) * horizon + height * zenith + 0.25 * glow * np.array([1.0, 0.9, 0.7]), 0.0, 1.0)
+    srgb: FloatArray = (1.0 - height) * horizon + height * zenith + 0.25 * glow * np.array([1.0, 0.9, 0.7])
+    return np.clip(srgb, 0.0, 1.0)

@@ -84,7 +84,7 @@ def strip(
     albedo: FloatArray,
     surface: Surface = Surface.MINERAL,
 ) -> Mesh:
-    """Flat quads along the pieces, between two lateral offsets (P,), left positive; ``z_m`` one height or those of the 4 corners."""
+    """Quads along the pieces, between two lateral offsets (P,), left positive; ``z_m`` one height or the 4 corners'."""
     corners = [
         pieces.start_m + right_m[:, None] * pieces.start_normal,
         pieces.end_m + right_m[:, None] * pieces.end_normal,

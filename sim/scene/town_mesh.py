@@ -10,7 +10,7 @@ import numpy as np
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.scene.buildings import building_mesh, place_buildings
 from hippodrome.sim.scene.furniture import furniture_mesh
-from hippodrome.sim.scene.land import field_mesh, ground_mesh, patch_mesh
+from hippodrome.sim.scene.land import field_mesh, ground_mesh, patch_mesh, place_fields
 from hippodrome.sim.scene.lanes import cut_lanes
 from hippodrome.sim.scene.mesh import Mesh, merge
 from hippodrome.sim.scene.placement import borders, paved_area, quilt
@@ -28,16 +28,17 @@ def town_mesh(town: Town, seed: int, origin_m: FloatArray) -> tuple[Mesh, Mesh]:
     share = _town_share(town, district)
     pieces = cut_lanes(town.network, origin_m)
     border, paved = borders(pieces, town.network.is_internal), paved_area(town, origin_m)[0]
-    buildings = place_buildings(border, share(border.point_m), paved, build)
-    houses = buildings.footprints()
-    trees = place_trees(border, paved, houses, plant)
-    hedges, hedge_ground = hedge_mesh(border, paved, houses, hedge)
-    taken = np.concatenate([houses, hedge_ground])
+    fields = place_fields(border, share(border.point_m), paved, field)
+    buildings = place_buildings(border, share(border.point_m), paved, fields.footprints(), build)
+    built = np.concatenate([buildings.footprints(), fields.footprints()])
+    trees = place_trees(border, paved, built, plant)
+    hedges, hedge_ground = hedge_mesh(border, paved, built, hedge)
+    taken = np.concatenate([built, hedge_ground])
     signals = town.signals_m - [*origin_m, 0.0]
     posts = furniture_mesh(border, share(border.point_m), signals, town.left_hand, paved, taken, post)
     road_bold, road_fine = road_mesh(town, origin_m, share, road)
     house_bold, house_fine = building_mesh(buildings, build)
-    field_bold, field_fine = field_mesh(border, paved, houses, field)
+    field_bold, field_fine = field_mesh(fields, field)
     treelines = treeline_mesh(border, paved, plant)
     land = ground_mesh(pieces.middle_m(), ground)
     # What hides other things comes first: the depth test then spares the shading of what is hidden, the ground last of all.

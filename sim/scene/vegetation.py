@@ -44,14 +44,14 @@ class Trees:
         return Trees(self.shape[rows], self.foot_m[rows], self.height_m[rows], self.radius_m[rows])
 
 
-def place_trees(border: Border, roads: Shapes, houses: Shapes, rng: np.random.Generator) -> Trees:
+def place_trees(border: Border, roads: Shapes, taken: Shapes, rng: np.random.Generator) -> Trees:
     """Gardens and verges near the road, groves behind; dense and bare stretches alternate."""
     near = _propose(border, 7.0, (1.5, 9.0), 45.0, 0.42, rng)
     far = _propose(border, 7.0, (10.0, 60.0), 70.0, 0.40, rng)
     proposed = Trees(*(np.concatenate([getattr(near, name), getattr(far, name)]) for name in Trees.__slots__))
     points = shapely.points(proposed.foot_m)
     reach = proposed.radius_m + BRANCH_CLEARANCE_M
-    proposed = proposed.select(clear_of(points, roads, reach) & clear_of(points, houses, 0.6 * reach))
+    proposed = proposed.select(clear_of(points, roads, reach) & clear_of(points, taken, 0.6 * reach))
     return proposed.select(spread(shapely.points(proposed.foot_m), 2.2))
 
 
@@ -189,7 +189,7 @@ def hedge_mesh(border: Border, roads: Shapes, obstacles: Shapes, rng: np.random.
     steps = rng.integers(3, 10, k)
     centre = site.point_m + site.outward * rng.uniform(1.7, 3.5, k)[:, None]
     yaw = site.inward_yaw_rad()
-    shapes = rectangles(centre, yaw, steps * HEDGE_STEP_M, np.full(k, 1.2))
+    shapes = rectangles(centre, yaw, HEDGE_STEP_M * steps.astype(np.float64), np.full(k, 1.2))
     free = np.flatnonzero(clear_of(shapes, roads, 0.4) & clear_of(shapes, obstacles, 0.4))
     free = free[spread(shapes[free], 1.0)]
     is_wall = rng.random(k) < 0.25

@@ -73,7 +73,7 @@ def turned(local: FloatArray, origin_m: FloatArray, yaw_rad: FloatArray) -> Floa
     x = cos * local[..., 0] - sin * local[..., 1] + origin_m[:, 0, None]
     y = sin * local[..., 0] + cos * local[..., 1] + origin_m[:, 1, None]
     z = local[..., 2] + (origin_m[:, 2, None] if origin_m.shape[1] == 3 else 0.0)
-    return np.stack([x, y, z], axis=-1)
+    return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
 
 
 def placed(

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import prod
 
 import numpy as np
 
 from hippodrome.core.types import CognitiveMap, EdgeKind, MatchStatus, RoadMatch
 from hippodrome.proto.arrays import Array, FieldError
+
+MAX_DESCRIPTOR_DIMENSIONS = 8  # rows, columns, bins and room to grow
 
 
 def check_map(cognitive_map: CognitiveMap) -> None:
@@ -15,9 +18,11 @@ def check_map(cognitive_map: CognitiveMap) -> None:
     vertices = len(cognitive_map.t_s)
     for name, array in _floats(cognitive_map):
         _require(np.isfinite(array), name, "not finite")
-    edges = cognitive_map.edges
+    cells, edges = cognitive_map.view_cells, cognitive_map.edges
+    if len(cells.shape) > MAX_DESCRIPTOR_DIMENSIONS or prod(cells.shape) != len(cells.mean):
+        raise FieldError(f"descriptor shape {cells.shape[:MAX_DESCRIPTOR_DIMENSIONS]} does not make {len(cells.mean)} values")
     for name, index, count in (
-        ("view_cell", cognitive_map.view_cell, len(cognitive_map.view_cells.templates)),
+        ("view_cell", cognitive_map.view_cell, len(cells.templates)),
         ("edges.source", edges.source, vertices),
         ("edges.target", edges.target, vertices),
         ("edges.kind", edges.kind, len(EdgeKind)),
@@ -30,6 +35,8 @@ def check_map(cognitive_map: CognitiveMap) -> None:
 
 def _check_road_match(match: RoadMatch) -> None:
     lanes = len(match.lane_ids)
+    if any("\0" in lane_id for lane_id in match.lane_ids):
+        raise FieldError("road_match.lane_ids holds a zero byte")
     _require((match.lane >= -1) & (match.lane < lanes), "road_match.lane", f"outside -1..{lanes - 1}")
     _require(np.isfinite(match.position_m) == (match.lane >= 0), "road_match.position_m", "finite without a lane or the reverse")
     _require(match.status < len(MatchStatus), "road_match.status", f"outside 0..{len(MatchStatus) - 1}")

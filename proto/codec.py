@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import prod
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,13 +19,13 @@ from hippodrome.core.types import (
 )
 from hippodrome.proto import cognitive_map_pb2 as wire
 from hippodrome.proto.arrays import FieldError, pack, row_differences, row_sums, unpack
-from hippodrome.proto.checks import check_map
+from hippodrome.proto.checks import MAX_DESCRIPTOR_DIMENSIONS, check_map
 from hippodrome.proto.layout import ATTRACTORS, EDGES, REFINED_VERTICES, ROAD_MATCH, TEMPLATE_TYPES, VERTICES, VISITS, Layout
+from hippodrome.proto.migrate import migrate
 from hippodrome.proto.pbstream import PbstreamError, read_stream, write_stream
 
 FORMAT_VERSION: Final = 2
 MAX_HEADER_BYTES = 1 << 20  # provenance is names and versions, not data
-MAX_DESCRIPTOR_DIMENSIONS = 8
 
 _FRAMES: Final = {"semi-metric": wire.Header.SEMI_METRIC, "network": wire.Header.NETWORK}
 _KINDS: Final = {"gradient": wire.ViewCells.GRADIENT, "grey": wire.ViewCells.GREY}
@@ -48,7 +47,7 @@ def load_map(path: Path | str) -> tuple[CognitiveMap, dict[str, str]]:
     path = Path(path)
     version, records = read_stream(path, FORMAT_VERSION)
     try:
-        cognitive_map, provenance = decode_map(_parse(records))
+        cognitive_map, provenance = decode_map(migrate(_parse(records), version))
         check_map(cognitive_map)
     except (DecodeError, HippodromeError, UnicodeDecodeError) as error:
         raise PbstreamError(f"{path}: format version {version}: {error}; the file is damaged or hostile") from error
@@ -138,8 +137,8 @@ def _encode_view_cells(cells: ViewCells, header: wire.Header) -> wire.ViewCells:
 def _decode_view_cells(message: wire.ViewCells, header: wire.Header) -> ViewCells:
     kind = _named(_KINDS, message.kind, "kind of view cells")
     shape = (header.view_cells, header.descriptor_size)
-    if len(message.shape) > MAX_DESCRIPTOR_DIMENSIONS or prod(message.shape) != header.descriptor_size:
-        raise FieldError(f"descriptor shape has {len(message.shape)} dimensions that do not make {header.descriptor_size} values")
+    if len(message.shape) > MAX_DESCRIPTOR_DIMENSIONS:  # before a tuple of them is made
+        raise FieldError(f"descriptor shape has {len(message.shape)} dimensions, the limit is {MAX_DESCRIPTOR_DIMENSIONS}")
     return ViewCells(
         kind=kind,
         templates=row_sums(unpack(message.templates, TEMPLATE_TYPES[kind], shape, "templates")),

@@ -69,7 +69,7 @@ def read_stream(path: Path, newest_version: int) -> tuple[int, list[bytes]]:
 
 def _read_file(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
+        with open(path, "rb", opener=_open_without_waiting) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise PbstreamError(f"{path}: not a regular file")
@@ -81,6 +81,11 @@ def _read_file(path: Path) -> bytes:
             return magic + file.read(MAX_FILE_BYTES)
     except OSError as error:
         raise PbstreamError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _open_without_waiting(name: str, flags: int) -> int:
+    """A named pipe would block until someone writes to it."""
+    return os.open(name, flags | os.O_NONBLOCK)
 
 
 def _version(path: Path, data: bytes, newest_version: int) -> int:

@@ -32,7 +32,11 @@ def random_map(seed=0, vertices=5, cells=4, edges=6, visits=7, modules=2, shape=
         ),
         visits=Visits(np.cumsum(rng.uniform(0.1, 1.0, visits)), index(visits, vertices), rng.normal(size=(visits, 3))),
         attractors=AttractorStates(
-            single(vertices, 2), single(vertices, 2), single(modules), single(vertices, modules, 2, 2), single(vertices, modules, 2, 2)
+            single(vertices, 2),
+            single(vertices, 2),
+            single(modules),
+            single(vertices, modules, 2, 2),
+            single(vertices, modules, 2, 2),
         ),
     )
     if not refined:

@@ -69,7 +69,7 @@ def metric_edges(edges: Edges, scale_m: float) -> Edges:
 
 def optimise(poses: FloatArray, edges: Edges, matched: MatchedPath, config: PaperRefineConfig) -> FloatArray:
     """Minimum of Eq. (12), Li et al. 2025, by Gauss-Newton. Unmatched vertices hang on their edges alone."""
-    vertex = np.flatnonzero(matched.lane >= 0)
+    vertex = np.flatnonzero(matched.lane >= 0).astype(np.int32)
 
     def linearise(state: FloatArray) -> tuple[FloatArray, csr_array]:
         at = state.reshape(-1, 3)

@@ -33,24 +33,30 @@ FLOORS = {"along": 0.005, "across": 0.005, "heading": 0.0005, "log_scale": 0.000
 # below these, no sensor or driver is believable, and the equations lose their condition
 
 
-def reestimated(noise: Noise, steps_sq: FloatArray, across_sq: float, turned_sq: float, closure_median_sq: float | None) -> Noise:
-    """One step of expectation maximisation: each sigma times the root of its mean expected squared whitened residual.
+def per_freedom(residual: FloatArray, weight: FloatArray, used: FloatArray) -> FloatArray:
+    """Squares of whitened residuals (N, M) per degree of freedom that the solution left them, (M,).
 
-    ``steps_sq`` (4,): odometry; ``across_sq``, ``turned_sq``: road; ``closure_median_sq``: median over closures, of 3 components.
+    Helmert's variance components: of N weighted residuals, the estimate used up ``used`` = tr(J Sigma J^T). Unlike expectation
+    maximisation it converges in a few rounds; one round may change a sigma at most by ``LARGEST_CHANGE``.
     """
-    updates = {
-        "along": noise.along * np.sqrt(steps_sq[0]),
-        "across": noise.across * np.sqrt(steps_sq[1]),
-        "heading": noise.heading * np.sqrt(steps_sq[2]),
-        "log_scale": noise.log_scale * np.sqrt(steps_sq[3]),
-        "lateral_m": noise.lateral_m * np.sqrt(across_sq),
-        "lane_heading_rad": noise.lane_heading_rad * np.sqrt(turned_sq),
-    }
-    floored = {name: float(max(value, FLOORS[name])) for name, value in updates.items()}
+    freedom = np.maximum(np.sum(weight, axis=0) - used, 1e-3 * len(residual) + 1.0)
+    ratio: FloatArray = np.clip(np.sum(residual**2, axis=0) / freedom, LARGEST_CHANGE**-2, LARGEST_CHANGE**2)
+    return ratio
+
+
+def reestimated(noise: Noise, steps_sq: FloatArray, roads_sq: FloatArray, closure_median_sq: float | None) -> Noise:
+    """Sigmas times the root of their squared residuals per degree of freedom.
+
+    ``steps_sq`` (4,): odometry; ``roads_sq`` (2 or more): across, heading; ``closure_median_sq``: median over closures, of 3 components.
+    """
+    names = ("along", "across", "heading", "log_scale", "lateral_m", "lane_heading_rad")
+    factors = np.sqrt(np.concatenate([steps_sq, roads_sq[:2]]))
+    updates = {n: float(max(getattr(noise, n) * f, FLOORS[n])) for n, f in zip(names, factors, strict=True)}
     factor = noise.closure_factor
     if closure_median_sq is not None:
         factor = float(np.clip(factor * np.sqrt(closure_median_sq / CHI_SQ_3_MEDIAN), 0.2, 5.0))
-    return replace(noise, **floored, closure_factor=factor)
+    return replace(noise, **updates, closure_factor=factor)
 
 
 CHI_SQ_3_MEDIAN = 2.366
+LARGEST_CHANGE = 2.0

@@ -14,7 +14,7 @@ import numpy as np
 from hippodrome.core.chain_solver import ChainFactor, marginals, solve_coupled
 from hippodrome.core.matching.route_line import RouteLine, route_line
 from hippodrome.core.matching.route_search import RouteSearchConfig, search_route
-from hippodrome.core.noise_estimation import Noise, reestimated
+from hippodrome.core.noise_estimation import Noise, per_freedom, reestimated
 from hippodrome.core.refinement_residuals import (
     State,
     Targets,
@@ -131,17 +131,19 @@ def gauss_newton_step(state: State, visits: Visits, edges: Edges, targets: Targe
 
 
 def estimate_noise(state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise, factor: ChainFactor) -> Noise:
-    """Expected squared whitened residuals under the current posterior, by kind."""
+    """Squared whitened residuals per degree of freedom left, by kind."""
     own, next_ = marginals(factor)
     steps, roads, tied = odometry(state, visits, noise), road(state, targets, noise), closures(state, edges, noise)
     joint = np.block([[own[:-1], next_], [np.swapaxes(next_, 1, 2), own[1:]]])
     both = np.concatenate([steps.here, steps.there], axis=2)
-    steps_sq = np.mean(steps.residual**2 + np.einsum("nmi,nij,nmj->nm", both, joint, both), axis=0)
-    roads_sq = roads.residual**2 + np.einsum("nmi,nij,nmj->nm", roads.here, own, roads.here)
-    roads_sq = np.sum(roads_sq, axis=0) / np.maximum(np.sum(roads.weight, axis=0), 1e-9)
+    steps_used = np.einsum("nmi,nij,nmj->m", both, joint, both)
+    roads_used = np.einsum("nmi,nij,nmj->m", roads.here, own, roads.here)
     plain_sq = np.sum(tied.residual**2, axis=1) / np.maximum(tied.weight[:, 0], 1e-12)
     return reestimated(
-        noise, steps_sq, float(roads_sq[0]), float(roads_sq[1]), float(np.median(plain_sq)) if len(plain_sq) else None
+        noise,
+        per_freedom(steps.residual, steps.weight, steps_used),
+        per_freedom(roads.residual, roads.weight, roads_used),
+        float(np.median(plain_sq)) if len(plain_sq) else None,
     )
 
 

@@ -1,4 +1,4 @@
-"""The ego's path: from the lanes that SUMO drove to one smooth curve that a car can follow."""
+"""The ego's path: from the lanes that SUMO drove to one smooth curve that a car can follow, with its turning circle."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numba import njit
 from scipy.ndimage import gaussian_filter1d
 
 from hippodrome.core.road_network import RoadNetwork
@@ -16,6 +17,12 @@ STEP_M: Final = 0.25  # sampling of the path, finer than one simulation step at 
 ROUNDING_M: Final = 1.5  # standard deviation of the smoothing: a 30 degree joint becomes a bend of 7 m radius
 CHANGE_S: Final = 3.5  # duration of a lane change: 5.8 * 3.2 m / (3.5 s)^2 = 1.5 m/s^2 sideways
 MIN_CHANGE_M: Final = 12.0  # a slow car cannot change lanes on the spot
+MAX_CURVATURE_1PM: Final = 0.32  # turning circle of a small car: 3.1 m at the rear axle, 10 m at the outer front corner
+MAX_CURVATURE_SLOPE_1PM2: Final = 0.25  # from straight on to full lock within 1.3 m: 0.6 s at walking pace
+FINE_ROUNDING_M: Final = 0.5  # takes the integration's grain out of the curvature
+RETURN_M: Final = 3.0  # distance over which a car that could not follow comes back to the lane
+LOOK_AHEAD_M: Final = 0.6  # steering begins before the bend, by half the way that it takes
+FINE_STEP_M: Final = 0.05  # integration step of the turning circle
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +62,10 @@ def smooth_path(network: RoadNetwork, pieces: Sequence[Piece], aside_m: FloatArr
     starts = piece_starts(pieces)
     points = _on_centrelines(network, pieces, starts)
     points = points + _lane_changes(points, pieces, starts)
-    points = _rounded(points)
+    points = _rounded(points, ROUNDING_M)
     if aside_m is not None:
         points = points + aside_m[:, None] * _left(points)
-    return _as_path(points)
+    return _as_path(_rounded(_within_turning_circle(_as_path(points)), FINE_ROUNDING_M))
 
 
 def sample_count(pieces: Sequence[Piece]) -> int:
@@ -108,16 +115,16 @@ def _left_beside_jumps(points_m: FloatArray, jumps: list[int]) -> FloatArray:
     for after in jumps:
         steps[after - 1] = steps[after]
     straightened = np.concatenate([points_m[:1], points_m[0] + np.cumsum(steps, axis=0)])
-    return _left(_rounded(straightened))
+    return _left(_rounded(straightened, ROUNDING_M))
 
 
-def _rounded(points_m: FloatArray) -> FloatArray:
+def _rounded(points_m: FloatArray, deviation_m: float) -> FloatArray:
     """Gaussian smoothing along the path; beyond its ends the path is taken to go straight on."""
-    pad = min(len(points_m) - 1, int(4 * ROUNDING_M / STEP_M))
+    pad = min(len(points_m) - 1, int(4 * deviation_m / STEP_M))
     before = 2.0 * points_m[0] - points_m[pad:0:-1]
     after = 2.0 * points_m[-1] - points_m[-2 : -pad - 2 : -1]
     padded = np.concatenate([before, points_m, after])
-    smooth: FloatArray = gaussian_filter1d(padded, ROUNDING_M / STEP_M, axis=0, mode="nearest")[pad : pad + len(points_m)]
+    smooth: FloatArray = gaussian_filter1d(padded, deviation_m / STEP_M, axis=0, mode="nearest")[pad : pad + len(points_m)]
     return smooth
 
 
@@ -135,3 +142,43 @@ def _as_path(points_m: FloatArray) -> Path:
     stretch = np.maximum(np.linalg.norm(first, axis=1), 0.05)
     curvature = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / stretch**3
     return Path(points_m, np.unwrap(np.arctan2(first[:, 1], first[:, 0])), curvature, stretch)
+
+
+def _within_turning_circle(path: Path) -> FloatArray:
+    """Points (n, 2) beside each sample of where a car goes that cannot turn tighter than ``MAX_CURVATURE_1PM``."""
+    x, y = np.ascontiguousarray(path.points_m[:, 0]), np.ascontiguousarray(path.points_m[:, 1])
+    driven: FloatArray = _steer_along(x, y, path.heading_rad, path.curvature_1pm, path.stretch)
+    return driven
+
+
+@njit(cache=True)
+def _steer_along(x: FloatArray, y: FloatArray, heading: FloatArray, curvature: FloatArray, stretch: FloatArray) -> FloatArray:
+    """kappa = kappa_path - e / l^2 - 2 psi / l (Samson, 1993, linearised), integrated over distance within the car's limits."""
+    n = len(x)
+    driven = np.empty((n, 2))
+    driven[:, 0], driven[:, 1] = x, y
+    px, py, psi, kappa, u, filled = x[0], y[0], heading[0], 0.0, 0.0, 1
+    for _ in range(int(20 * n * STEP_M / FINE_STEP_M)):
+        k = min(int(u / STEP_M), n - 2)
+        share = u / STEP_M - k
+        ref = heading[k] + share * (heading[k + 1] - heading[k])
+        dx, dy = px - (x[k] + share * (x[k + 1] - x[k])), py - (y[k] + share * (y[k + 1] - y[k]))
+        offset, turn = np.cos(ref) * dy - np.sin(ref) * dx, psi - ref
+        ahead = min(int((u + LOOK_AHEAD_M) / STEP_M), n - 1)
+        wanted = curvature[ahead] - offset / RETURN_M**2 - 2.0 * turn / RETURN_M
+        wanted = min(max(wanted, -MAX_CURVATURE_1PM), MAX_CURVATURE_1PM)
+        most = MAX_CURVATURE_SLOPE_1PM2 * FINE_STEP_M
+        kappa += min(max(wanted - kappa, -most), most)
+        before_x, before_y, before_u = px, py, u
+        px, py = px + FINE_STEP_M * np.cos(psi), py + FINE_STEP_M * np.sin(psi)
+        psi += FINE_STEP_M * kappa
+        dx, dy = px - (x[k] + share * (x[k + 1] - x[k])), py - (y[k] + share * (y[k + 1] - y[k]))
+        u += max((np.cos(ref) * dx + np.sin(ref) * dy) / stretch[k], 0.0)
+        while filled < n and filled * STEP_M <= u:
+            part = (filled * STEP_M - before_u) / (u - before_u)
+            driven[filled, 0] = before_x + part * (px - before_x)
+            driven[filled, 1] = before_y + part * (py - before_y)
+            filled += 1
+        if filled == n:
+            break
+    return driven

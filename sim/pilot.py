@@ -21,7 +21,7 @@ WARM_UP_S: Final = 20.0  # traffic spreads before the ego enters
 ENTRY_PATIENCE_S: Final = 120.0  # for a gap to enter the road
 STUCK_AFTER_S: Final = 180.0  # longer than any red light
 SIGHT_AHEAD_M: Final = 80.0  # braking from 50 km/h at 2 m/s^2 takes 50 m
-SIGHT_BEHIND_STEPS: Final = 60  # of the log: the curve that the rear axle is still in
+SIGHT_BEHIND_M: Final = 15.0  # the bend that the rear axle is still in
 REFILL_STEPS: Final = 10  # traffic is topped up once a second
 LAST_CHANCE_M: Final = 8.0  # a turn is given up this long before the car would have to stop for it
 SPARE_M: Final = 200.0  # planned beyond the tour's length, so that SUMO's ego does not leave the road before
@@ -65,6 +65,7 @@ class Pilot:
         self._route: list[int] = []  # edges of the network
         self._leads_on = True  # the present lane leads to the route's next edge
         self._cap_mps, self._cap_offset_m = np.zeros(1), 0.0
+        self._entries: list[int] = []  # steps at which the view ahead was renewed, in general on a new lane
         self._log = DriveLog()
 
     def drive(self, others: BackgroundTraffic) -> DriveLog:
@@ -132,7 +133,7 @@ class Pilot:
     def _look_ahead(self) -> None:
         """On a new lane: the comfortable speed along it and what follows."""
         lane, onward = self._log.lane[-1], self._onward_edges()
-        pieces, _ = lane_pieces(self._network, self._log.lanes(SIGHT_BEHIND_STEPS))
+        pieces, _ = lane_pieces(self._network, self._log.lanes(self._steps_behind()))
         here = pieces[-1]
         pieces[-1] = Piece(lane, here.begin_m, float(self._lengths_m[lane]), here.side_step, here.speed_mps)
         ahead = lanes_ahead(self._network, lane, onward, SIGHT_AHEAD_M)
@@ -143,6 +144,15 @@ class Pilot:
         self._cap_mps = comfortable_speed_mps(smooth_path(self._network, pieces), limit, self._ego)
         on_road = not self._network.is_internal[lane]
         self._leads_on = not on_road or not onward or bool(ways_to_edge(self._network, lane, onward[0]))
+
+    def _steps_behind(self) -> int:
+        """How many of the last steps show the bend that the car's rear is still in."""
+        self._entries.append(len(self._log.lane) - 1)
+        behind_m, k = 0.0, len(self._entries) - 1
+        while k > 0 and behind_m < SIGHT_BEHIND_M:
+            k -= 1
+            behind_m += float(self._lengths_m[self._log.lane[self._entries[k]]])
+        return len(self._log.lane) - self._entries[k]
 
     def _set_speed(self) -> None:
         """No faster than what the rear axle's place on the path allows; SUMO adds right of way and the cars ahead."""

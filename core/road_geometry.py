@@ -89,10 +89,10 @@ def project(geometry: RoadGeometry, points_m: FloatArray, radius_m: float) -> Pr
     point, segment = _nearby_segments(geometry, points, radius_m)
     along, foot, distance = _feet(geometry, points[point], segment)
     lane = geometry.segment_lane[segment]
-    order = np.lexsort((segment, distance, lane, point))
-    order = order[distance[order] <= radius_m]
-    first = np.ones(len(order), dtype=bool)  # of its (point, lane): the nearest segment of that lane
-    first[1:] = (np.diff(point[order]) != 0) | (np.diff(lane[order]) != 0)
+    own = point.astype(np.int64) * geometry.network.lane_count + lane
+    order = np.flatnonzero(distance <= radius_m)
+    order = order[np.lexsort((distance[order], own[order]))]
+    first = np.diff(own[order], prepend=-1) != 0  # of its point and lane: the nearest segment of that lane
     best = order[first]
     best = best[np.lexsort((lane[best], distance[best], point[best]))]
     direction = geometry.segment_direction[segment[best]]
@@ -126,12 +126,10 @@ def _directions(step: FloatArray, length: FloatArray) -> FloatArray:
 
 
 def _nearby_segments(geometry: RoadGeometry, points: FloatArray, radius_m: float) -> tuple[IntArray, IntArray]:
-    """Pairs (point, segment), each once, that hold every pair within the radius."""
+    """Pairs (point, segment), some more than once, that hold every pair within the radius."""
     reach = radius_m + 0.5 * SAMPLE_SPACING_M
     pairs = cKDTree(points).sparse_distance_matrix(geometry.tree, reach, output_type="ndarray")
-    segments = len(geometry.segment_lane)
-    key = np.unique(pairs["i"].astype(np.int64) * segments + geometry.sample_segment[pairs["j"]])
-    return (key // segments).astype(np.int32), (key % segments).astype(np.int32)
+    return pairs["i"].astype(np.int32), geometry.sample_segment[pairs["j"]]
 
 
 def _feet(geometry: RoadGeometry, points: FloatArray, segment: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:

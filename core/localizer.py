@@ -58,8 +58,9 @@ class Localizer:
         self._query_mean = view_cells.start_query_mean(self._places.bank.mean, config.mean_trust)
         self._view_step = view_step.start()
         self._step_m, self._turned_rad = 0.0, 0.0  # since the last look
-        self._evidence = 0.0  # for the incumbent; 0: no fix
-        self._challenge = 0.0  # for the challenger
+        self._fixed = False  # an incumbent has been adopted
+        self._evidence = 0.0  # mode "paper": summed margins so far
+        self._challenge = 0.0  # summed margins of the challenger
         self._margin, self._cell = 0.0, -1
 
     def step(self, observation: Observation) -> LocalizationEstimate:
@@ -113,14 +114,16 @@ class Localizer:
     def _reactivate(self, injection: Injection) -> None:
         """Agreement strengthens the incumbent, or the challenger until it wins; anything else starts a new challenge."""
         config, belief, gate = self._config, self._belief, self._config.injection.gate
-        if isinstance(belief, PaperPose) or (self._evidence > 0.0 and belief.sq_distance(injection) <= gate):
-            self._belief = belief.inject(injection)
-            self._evidence, self._challenge = min(self._evidence + self._margin, config.evidence_limit), 0.0
+        if isinstance(belief, PaperPose):
+            self._belief, self._evidence = belief.inject(injection), self._evidence + self._margin
+            self._fixed = self._evidence >= config.fix_evidence
+        elif self._fixed and belief.sq_distance(injection) <= gate:
+            self._belief, self._challenge = belief.inject(injection), 0.0
         elif belief.challenged and belief.sq_distance(injection, challenger=True) <= gate:
             self._belief = belief.reinforce(injection)
             self._challenge += self._margin
             if self._challenge >= config.fix_evidence:
-                self._belief, self._evidence, self._challenge = self._belief.adopt(), self._challenge, 0.0
+                self._belief, self._fixed, self._challenge = self._belief.adopt(), True, 0.0
         else:
             self._belief, self._challenge = belief.challenge(injection), self._margin
 
@@ -135,7 +138,7 @@ class Localizer:
             t_s=t_s,
             pose=belief.pose,
             covariance=covariance,
-            localized=self._evidence > 0.0 and sigma_m < config.lost_sigma_m and not doubted,
+            localized=self._fixed and sigma_m < config.lost_sigma_m and not doubted,
             confidence=self._margin,
             view_cell=self._cell,
             **_activity(belief),

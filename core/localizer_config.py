@@ -74,7 +74,6 @@ class LocalizerConfig:
     margin: float = 1.2  # filtered margin at which a view cell is reactivated: 87 % right on its own
     fix_evidence: float = 4.0  # summed margin of agreeing reactivations that makes a fix or overturns one
     doubt_evidence: float = 2.0  # of a challenger, at which "localized" is taken back
-    evidence_limit: float = 8.0  # of the incumbent
     lost_sigma_m: float = 6.0  # "localized" is taken back when the position's standard deviation exceeds this
     lane_sigma_m: float = 0.5  # of a driver about the lane's centre; 0: no lane pull
     step_tolerance_m: float = 3.5  # of a look's travel along the map: scale and spacing differ between drives

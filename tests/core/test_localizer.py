@@ -1,0 +1,220 @@
+"""The localizer in a looped world, and its parts by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hippodrome.core import localizer_places as places_module
+from hippodrome.core import se2
+from hippodrome.core.localizer import Localizer, LocalizerConfig, localize
+from hippodrome.core.localizer_attractor import AttractorPose
+from hippodrome.core.localizer_config import Injection
+from hippodrome.core.localizer_kalman import KalmanPose
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.types import HippodromeError
+from tests.core.looped_world import Pictures, drive, loop_length, topometric_map
+
+PICTURES = Pictures(seed=3)
+MAP = topometric_map(PICTURES, np.random.default_rng(3))
+
+
+def run(mode="default", cognitive_map=MAP, seed=11, length_m=700.0, metres_per_unit=2.5, **driving):
+    observations, truth = drive(
+        PICTURES, np.random.default_rng(seed), 137.0, length_m, metres_per_unit=metres_per_unit, **driving
+    )
+    estimates = localize(observations, cognitive_map, None, LocalizerConfig(mode=mode))
+    localized = np.array([estimate.localized for estimate in estimates])
+    error_m = np.linalg.norm(np.array([estimate.pose for estimate in estimates])[:, :2] - truth[:, :2], axis=1)
+    return estimates, truth, localized, error_m
+
+
+@pytest.fixture(scope="module")
+def default_run():
+    return run()
+
+
+@pytest.fixture(scope="module")
+def kalman_run():
+    return run("kalman")
+
+
+def test_finds_itself_from_an_unknown_start_although_the_scale_is_a_quarter_off(default_run):
+    _, _, localized, error_m = default_run
+    first = int(np.argmax(localized))
+    assert 0 < first * 0.8 < 50.0  # metres driven
+    assert localized[first:].mean() > 0.95
+    assert error_m[localized].mean() < 1.2
+    assert error_m[localized].max() < 6.0
+
+
+def test_default_matches_the_kalman_yardstick(default_run, kalman_run):
+    _, _, localized, error_m = default_run
+    _, _, kalman_localized, kalman_error_m = kalman_run
+    assert error_m[localized].mean() < 1.1 * kalman_error_m[kalman_localized].mean() + 0.05
+
+
+def test_covariance_is_honest(default_run):
+    estimates, truth, localized, _ = default_run
+    nees = []
+    for estimate, true, known in zip(estimates, truth, localized, strict=True):
+        np.linalg.cholesky(estimate.covariance)
+        error = estimate.pose[:2] - true[:2]
+        if known:
+            nees.append(error @ np.linalg.solve(estimate.covariance[:2, :2], error))
+    assert 0.5 < np.mean(nees) < 4.0  # 2 for two degrees of freedom
+
+
+def test_moves_smoothly_between_views(default_run):
+    estimates, _, localized, _ = default_run
+    first = int(np.argmax(localized)) + 1
+    steps = np.linalg.norm(np.diff([estimate.pose[:2] for estimate in estimates[first:]], axis=0), axis=1)
+    assert np.median(steps) == pytest.approx(0.8, rel=0.1)
+    assert steps.max() < 3.5
+
+
+def test_kidnapping_is_noticed_and_recovered_from():
+    _, _, localized, error_m = run(kidnap=(400.0, 60.0))
+    after = 500  # steps of 0.8 m
+    assert error_m[after] > 100.0
+    wrong = np.flatnonzero(localized[after:] & (error_m[after:] > 20.0))
+    recovered = np.flatnonzero(localized[after:] & (error_m[after:] < 5.0))
+    assert len(wrong) < 25
+    assert recovered[0] * 0.8 < 60.0
+    assert error_m[after + recovered[0] :].max() < 8.0
+
+
+def test_another_town_is_never_taken_for_this_one():
+    observations, _ = drive(Pictures(seed=99), np.random.default_rng(0), 0.0, 500.0)
+    assert not any(estimate.localized for estimate in localize(observations, MAP, None, LocalizerConfig()))
+
+
+def test_leaving_the_mapped_road_is_reported_once_dead_reckoning_is_spent():
+    half = topometric_map(PICTURES, np.random.default_rng(3), span_m=0.5 * loop_length())
+    _, _, localized, error_m = run(cognitive_map=half, length_m=720.0)
+    assert localized[:200].mean() > 0.9
+    assert not np.any(localized & (error_m > 20.0))
+    assert not localized[int((0.95 * loop_length() - 137.0) / 0.8)]
+
+
+def test_paper_mode_follows_the_views_but_not_the_scale():
+    _, _, localized, error_m = run("paper", metres_per_unit=2.0)
+    settled = error_m[np.argmax(localized) + 100 :].mean()
+    _, _, localized, error_m = run("paper", metres_per_unit=2.5)
+    off_scale = error_m[np.argmax(localized) + 100 :].mean()
+    assert settled < 1.5
+    assert off_scale > 2.5
+
+
+def test_same_input_same_answer(default_run):
+    again = run()[0]
+    assert all(np.array_equal(a.pose, b.pose) for a, b in zip(default_run[0], again, strict=True))
+
+
+def test_needs_a_map_in_the_network_frame():
+    with pytest.raises(HippodromeError, match="semi-metric"):
+        Localizer(replace(MAP, frame="semi-metric"), None, LocalizerConfig())
+
+
+def injection_at(x, y, heading):
+    return Injection(np.array([x, y, heading]), np.diag([1.0, 0.25, 0.01]))
+
+
+@pytest.mark.parametrize("pose_type", [AttractorPose, KalmanPose])
+def test_injections_along_a_straight_teach_the_scale(pose_type):
+    belief = pose_type.uniform(np.zeros(2), np.log(2.0), LocalizerConfig()).challenge(injection_at(0.0, 0.0, 0.0)).adopt()
+    for k in range(1, 40):
+        for _ in range(6):
+            belief = belief.predict(0.4, 0.0, 0.1)  # 1 m each at the true 2.5 m per unit
+        belief = belief.inject(injection_at(6.0 * k, 0.0, 0.0))
+    assert_allclose(belief.pose, [234.0, 0.0, 0.0], atol=0.15)
+    scale = belief.log_scale if isinstance(belief, AttractorPose) else belief.incumbent.mean[3]
+    assert np.exp(scale) == pytest.approx(2.5, rel=0.01)
+
+
+def test_networks_and_filter_agree_along_an_axis():
+    """Along a grid axis nothing of the position's covariance is lost, so both must give the same Gaussian."""
+    beliefs = []
+    for pose_type in (AttractorPose, KalmanPose):
+        belief = pose_type.uniform(np.zeros(2), 0.0, LocalizerConfig()).challenge(injection_at(0.0, 0.0, 0.0)).adopt()
+        for k in range(1, 15):
+            for _ in range(5):
+                belief = belief.predict(1.0, 0.002, 0.1)
+            belief = belief.inject(injection_at(5.0 * k + 0.3, 0.1 * k, 0.01 * k))
+        beliefs.append(belief)
+    ours, yardstick = beliefs
+    assert_allclose(ours.pose, yardstick.pose, atol=0.1)
+    assert_allclose(np.sqrt(np.diag(ours.covariance)), np.sqrt(np.diag(yardstick.covariance)), rtol=0.35)
+
+
+@pytest.mark.parametrize("pose_type", [AttractorPose, KalmanPose])
+def test_a_challenger_moves_along_its_own_heading_and_snaps_when_adopted(pose_type):
+    belief = pose_type.uniform(np.zeros(2), 0.0, LocalizerConfig()).challenge(injection_at(0.0, 0.0, 0.0)).adopt()
+    belief = belief.challenge(injection_at(300.0, 40.0, np.pi / 2))
+    for _ in range(10):
+        belief = belief.predict(1.0, 0.0, 0.1)
+    assert_allclose(belief.pose, [10.0, 0.0, 0.0], atol=0.1)
+    assert belief.sq_distance(injection_at(300.0, 50.0, np.pi / 2), challenger=True) < 1.0
+    assert_allclose(belief.adopt().pose, [300.0, 50.0, np.pi / 2], atol=0.1)
+
+
+def test_parabola_peaks_where_it_should():
+    def fall(x, peak):
+        return (x - peak) ** 2 - peak**2
+
+    for peak in (-1.5, 0.0, 0.8):
+        assert_allclose(places_module.peak_offset(4.0, 6.0, fall(-4.0, peak), fall(6.0, peak)), peak, atol=1e-12)
+    assert places_module.peak_offset(4.0, 6.0, 0.1, -5.0) == 0.0  # no peak: the cell itself
+    assert places_module.peak_offset(4.0, 6.0, 2.0, -1.0) == 3.0  # no farther than half way
+
+
+def test_links_follow_the_street_and_never_the_opposite_lane():
+    places = places_module.places_of(MAP, None, 0.0, 0.4)
+    for cell in range(2, len(places.poses_m) - 1, 7):
+        sources = places.link_from[places.link_start[cell] : places.link_start[cell + 1]]
+        assert cell - 1 in sources
+        assert cell + 1 not in sources
+    opposite = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 3.2, np.pi], [0.0, 3.2, np.pi]])
+    start, source, _, _ = places_module._links(opposite)
+    assert [list(source[start[j] : start[j + 1]]) for j in range(4)] == [[0], [0, 1], [2], [2, 3]]
+
+
+def test_evidence_runs_along_links_only():
+    links = (np.array([0, 1, 3]), np.array([0, 0, 1]), np.array([0.0, 5.0, 0.0]), np.zeros(3))
+    before, z = np.array([2.0, 0.0], np.float32), np.array([0.5, 1.0], np.float32)
+    moved = places_module.propagate(before, z, links, (5.0, 0.0), (3.0, 0.5), np.float32(0.5))
+    assert_allclose(moved, [0.25, 1.5])
+    turned = places_module.propagate(before, z, links, (5.0, 1.0), (3.0, 0.5), np.float32(0.5))
+    assert_allclose(turned, [0.25, 0.5])
+
+
+def test_lane_pull_needs_a_single_lane_of_the_same_way():
+    def lane(y, heading_east):
+        points = [[0.0, y], [100.0, y]]
+        return points if heading_east else points[::-1]
+
+    def network(*lanes):
+        count = len(lanes)
+        none = np.full(count, -1, dtype=np.int32)
+        return RoadNetwork(
+            lane_ids=tuple(f"l{i}" for i in range(count)),
+            edge_ids=tuple(f"e{i}" for i in range(count)),
+            lane_edge=np.arange(count, dtype=np.int32),
+            is_internal=np.zeros(count, dtype=bool),
+            width_m=np.full(count, 3.2),
+            speed_limit_mps=np.full(count, 13.9),
+            points_m=np.concatenate([np.array(points) for points in lanes]),
+            point_start=np.arange(0, 2 * count + 1, 2, dtype=np.int32),
+            successor=np.zeros(0, dtype=np.int32),
+            successor_start=np.zeros(count + 1, dtype=np.int32),
+            left_lane=none,
+            right_lane=none,
+        )
+
+    pose = np.array([[50.0, 0.6, 0.05]])
+    single = network(lane(0.0, True), lane(3.2, False))
+    assert_allclose(places_module.centred(pose, single, 0.5), [[50.0, 0.3, 0.05]])
+    double = network(lane(0.0, True), lane(3.2, True))
+    assert_allclose(places_module.centred(pose, double, 0.5), pose)
+    assert_allclose(se2.wrap(pose[:, 2]), pose[:, 2])

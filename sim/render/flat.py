@@ -111,6 +111,7 @@ class FlatRenderer(pyrender.renderer.Renderer):  # type: ignore[misc]  # pyrende
         self.haze, self.extinction_per_m, self.fine_range_m = haze, extinction_per_m, fine_range_m
         self._program: int | None
         self._program, self._uniform = _compile()
+        self._pixels = np.empty((height, width, 4), dtype=np.uint8)  # filled anew by every frame
         self._tiles: list[FlatPrimitive] = []
         self._bounds_m = np.zeros((0, 4))
 
@@ -189,10 +190,8 @@ class FlatRenderer(pyrender.renderer.Renderer):  # type: ignore[misc]  # pyrende
 
     def _read_main_framebuffer(self, scene: Any, flags: int) -> Frame:
         """Colour only, (H, W, 4), bottom row first as GL has it: four channels are a plain copy, three would be repacked."""
-        width, height = self.viewport_width, self.viewport_height
-        pixels = np.empty((height, width, 4), dtype=np.uint8)
-        gl.glReadPixels(0, 0, width, height, gl.GL_RGBA, gl.GL_UNSIGNED_BYTE, pixels)
-        return pixels
+        gl.glReadPixels(0, 0, self.viewport_width, self.viewport_height, gl.GL_RGBA, gl.GL_UNSIGNED_BYTE, self._pixels)
+        return self._pixels
 
 
 def visible_tiles(

@@ -45,7 +45,7 @@ def light_of(conditions: Conditions) -> Light:
     day = 1.0 - 0.72 * conditions.dusk
     clear, cloudy = np.array([0.34, 0.39, 0.47]), np.array([0.60, 0.61, 0.62])
     sky = day * ((1.0 - conditions.overcast) * clear + conditions.overcast * cloudy)
-    ground = 0.45 * sky + 0.12 * np.sin(elevation) * sun
+    ground = 0.45 * sky + 0.12 * direction[2] * sun
     return Light(sun_direction=direction, sun=sun, sky=sky, ground=ground)
 
 

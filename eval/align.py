@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 
 from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
 
-AlignmentName: TypeAlias = Literal["none", "start", "SE(2)", "Sim(2)", "SE(3)", "Sim(3)"]
+AlignmentName: TypeAlias = Literal["none", "start", "se2", "sim2", "se3", "sim3"]
+
+LABELS: Final = {
+    "none": "none",
+    "start": "start (first pose, no scale)",
+    "se2": "SE(2)",
+    "sim2": "Sim(2)",
+    "se3": "SE(3)",
+    "sim3": "Sim(3)",
+}
 
 DEGENERATE_RATIO = 1e-12  # singular values below this share of the point spread are rounding, not geometry
 
@@ -72,9 +81,11 @@ def find_alignment(name: AlignmentName, estimate_poses: FloatArray, reference_po
         return identity()
     if name == "start":
         return start_alignment(estimate_poses[0], reference_poses[0])
-    dimension = 3 if name.endswith("(3)") else 2
+    if name not in LABELS:
+        raise ValueError(f"alignment {name!r} is unknown, use one of {', '.join(LABELS)}")
+    dimension = 3 if name.endswith("3") else 2
     source, target = _lift(estimate_poses[:, :2], dimension), _lift(reference_poses[:, :2], dimension)
-    return umeyama(source, target, with_scale=name.startswith("Sim"))
+    return umeyama(source, target, with_scale=name.startswith("sim"))
 
 
 def apply_to_positions(transform: Transform, positions: FloatArray) -> FloatArray:

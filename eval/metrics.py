@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray, Trajectory
-from hippodrome.eval.align import AlignmentName, apply_to_positions, find_alignment
+from hippodrome.eval.align import LABELS, AlignmentName, apply_to_positions, find_alignment
 from hippodrome.eval.association import MAX_GAP_S, MIN_COVERAGE, Association, associate
 
 Pairing: TypeAlias = Literal["all", "chained"]
@@ -77,7 +77,7 @@ def ape(
     moved = apply_to_positions(transform, pairs.estimate[:, :2])
     offsets = moved[:, :2] - pairs.reference[:, :2]
     errors_m = np.hypot(offsets[:, 0], offsets[:, 1])
-    definition = f"APE, position, m; per estimated sample; alignment {alignment}; {_reference_clause(max_gap_s)}"
+    definition = f"APE, position, m; per estimated sample; alignment {LABELS[alignment]}; {_reference_clause(max_gap_s)}"
     return Score(definition, errors_m, pairs.t_s, len(pairs.t_s), pairs.total)
 
 

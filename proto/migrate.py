@@ -54,7 +54,7 @@ def _view_cells_from_1(message: wire.ViewCells, descriptor_size: int) -> wire.Vi
     rows = _flat(message.templates, "uint8", "templates")
     if len(rows) % max(descriptor_size, 1):
         raise FieldError(f"templates has {len(rows)} bytes, no multiple of the descriptor's {descriptor_size}")
-    upgraded = _transposed(message, (("mean", "float32", ()),))
+    upgraded: wire.ViewCells = _transposed(message, (("mean", "float32", ()),))
     upgraded.templates = row_differences(rows.reshape(-1, max(descriptor_size, 1))).tobytes()
     return upgraded
 

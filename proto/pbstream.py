@@ -78,7 +78,7 @@ def _read_file(path: Path) -> bytes:
             magic = file.read(len(MAGIC))
             if magic != MAGIC:
                 raise PbstreamError(f"{path}: byte 0: not a hippodrome map (it begins with {magic!r}, expected {MAGIC!r})")
-            return magic + file.read(MAX_FILE_BYTES)
+            return magic + file.read(status.st_size)  # never more than was just measured
     except OSError as error:
         raise PbstreamError(f"{path}: cannot be read: {error.strerror or error}") from error
 

@@ -67,7 +67,7 @@ def test_too_many_records_are_refused(tmp_path):
 
 
 def test_records_may_not_claim_more_than_the_limit_in_all(tmp_path):
-    packed = b"\0" * 300_000
+    packed = b"\0" * 400_000
     with pytest.raises(PbstreamError, match="512 MiB"):
         read(tmp_path, framed((300 << 20, packed), (300 << 20, packed)))
 

@@ -1,0 +1,183 @@
+"""Tables I and II as Markdown and on the terminal, from ``Results`` alone. Quoted rows are marked, failures keep their row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rich.console import Console
+from rich.table import Table
+
+from hippodrome.eval.results import ErrorSummary, Results, Row, ScenarioResult
+
+QUOTED_MARK = "†"
+QUOTED_NOTE = f"{QUOTED_MARK} quoted from the paper, another drive in another simulator; not measured here"
+NONE = "-"
+MEGABYTE = 1e6
+
+Cell: TypeAlias = Callable[[Row], str]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    title: str
+    cell: Cell
+
+
+def _figure(value: float | None, digits: int = 2) -> str:
+    """A number with ``digits`` decimals, or significant digits if it is smaller than one of them."""
+    if value is None:
+        return NONE
+    return f"{value:.{digits}f}" if value == 0.0 or abs(value) >= 10.0**-digits else f"{value:.1g}"
+
+
+def _count(value: int | None) -> str:
+    return NONE if value is None else f"{value:,}"
+
+
+def _mean(error: ErrorSummary | None) -> str:
+    return NONE if error is None else _figure(error.mean_m)
+
+
+def _spread(error: ErrorSummary | None) -> str:
+    """Median, 95th percentile and worst case."""
+    if error is None or error.median_m is None:
+        return NONE
+    return " / ".join(_figure(value) for value in (error.median_m, error.p95_m, error.max_m))
+
+
+def _map_size(row: Row) -> str:
+    return NONE if row.map_bytes is None else _figure(row.map_bytes / MEGABYTE)
+
+
+def _method(row: Row) -> str:
+    return f"{row.method} {QUOTED_MARK}" if row.quoted else row.method
+
+
+def _localization(row: Row, figure: Callable[..., str], field: str) -> str:
+    return NONE if row.localization is None else figure(getattr(row.localization, field))
+
+
+def _success(row: Row) -> str:
+    if row.localization is None or row.localization.success is None:
+        return NONE
+    return "yes" if row.localization.success else "NO"
+
+
+MAPPING_COLUMNS = (
+    Column("Method", _method),
+    Column("CPU (%)", lambda row: _figure(row.cpu_percent)),
+    Column("Map (MB)", _map_size),
+    Column("Frames", lambda row: _count(row.camera_frames)),
+    Column("Keyframes", lambda row: _count(row.keyframes)),
+    Column("Vertices", lambda row: _count(row.vertices)),
+    Column("Edges", lambda row: _count(row.edges)),
+    Column("APE (m)", lambda row: _mean(row.ape)),
+    Column("APE median / p95 / max", lambda row: _spread(row.ape)),
+    Column("RPE (m)", lambda row: _mean(row.rpe)),
+    Column("RPE 20 m (m)", lambda row: _mean(row.rpe_20m)),
+    Column("APE Sim(2) (m)", lambda row: _mean(row.ape_sim2)),
+)
+
+LOCALIZATION_COLUMNS = (
+    Column("Method", _method),
+    Column("Success", _success),
+    Column("Error (m)", lambda row: _localization(row, _figure, "error_mean_m")),
+    Column("Error p95 (m)", lambda row: _localization(row, _figure, "error_p95_m")),
+    Column("First fix (ms)", lambda row: _localization(row, _figure, "initial_time_ms")),
+    Column("First fix (m driven)", lambda row: _localization(row, lambda value: _figure(value, 1), "initial_distance_m")),
+    Column("Localized (%)", lambda row: _localization(row, _percent, "localized_share")),
+    Column("False fixes", lambda row: _localization(row, _count, "false_fixes")),
+)
+
+
+def _percent(share: float | None) -> str:
+    return NONE if share is None else f"{100.0 * share:.1f}"
+
+
+def table_one_markdown(results: Results, quoted: Sequence[Row] = ()) -> str:
+    """Per scenario: the mapping table (the paper's Table I) and the localization table, with every definition beneath."""
+    return "\n".join(_scenario_markdown(scenario, quoted) for scenario in results.scenarios)
+
+
+def print_table_one(results: Results, quoted: Sequence[Row], console: Console) -> None:
+    """The same tables on a terminal."""
+    for scenario in results.scenarios:
+        rows = (*scenario.rows, *quoted)
+        console.print(_rich_table(scenario_title(scenario), MAPPING_COLUMNS, rows))
+        if located := _with_localization(rows):
+            console.print(_rich_table(f"{scenario.name}: localization from an unknown start", LOCALIZATION_COLUMNS, located))
+        for row in rows:
+            if row.failure is not None:
+                console.print(f"{row.method}: FAILED: {row.failure}", markup=False, style="red", highlight=False)
+    if quoted:
+        console.print(QUOTED_NOTE, markup=False, style="dim", highlight=False)
+
+
+def scenario_title(scenario: ScenarioResult) -> str:
+    """What was driven, in one line."""
+    network = scenario.network
+    source = network.path if network.path is not None else f"generated, {network.generator}"
+    return (
+        f"{scenario.name}: {source}, {network.km:.1f} km of road, seed {scenario.seed}, noise {scenario.noise}, "
+        f"{scenario.frames:,} frames, {scenario.duration_s:,.0f} s"
+    )
+
+
+def definitions(rows: Sequence[Row]) -> list[str]:
+    """What each kind of figure in these rows means, each wording once, with the methods that it holds for."""
+    holders: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        for title, field in (("APE", row.ape), ("RPE", row.rpe), ("RPE 20 m", row.rpe_20m), ("APE Sim(2)", row.ape_sim2)):
+            if field is not None:
+                holders.setdefault((title, field.definition), []).append(_method(row))
+        if row.localization is not None:
+            holders.setdefault(("Localization", row.localization.definition), []).append(_method(row))
+    return [f"{title} ({', '.join(methods)}): {definition}" for (title, definition), methods in sorted(holders.items())]
+
+
+def _scenario_markdown(scenario: ScenarioResult, quoted: Sequence[Row]) -> str:
+    rows = (*scenario.rows, *quoted)
+    parts = [f"## {_escaped(scenario_title(scenario))}", "", _markdown_table(MAPPING_COLUMNS, rows), ""]
+    if located := _with_localization(rows):
+        parts += ["### Localization from an unknown start", "", _markdown_table(LOCALIZATION_COLUMNS, located), ""]
+    failures = [f"- {_escaped(row.method)}: FAILED: {_escaped(row.failure)}" for row in rows if row.failure is not None]
+    notes = [f"- {_escaped(line)}" for line in definitions(rows)]
+    mark = [f"- {QUOTED_NOTE}"] if any(row.quoted for row in rows) else []
+    return "\n".join([*parts, *failures, *notes, *mark, ""])
+
+
+def _with_localization(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row.localization is not None]
+
+
+def _markdown_table(columns: Sequence[Column], rows: Sequence[Row]) -> str:
+    columns = _filled(columns, rows)
+    lines = [[column.title for column in columns], ["---", *["---:"] * (len(columns) - 1)]]
+    lines += [[_escaped(text) for text in _cells(columns, row)] for row in rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _rich_table(title: str, columns: Sequence[Column], rows: Sequence[Row]) -> Table:
+    columns = _filled(columns, rows)
+    table = Table(title=title, title_justify="left", title_style="bold")
+    for column in columns:
+        table.add_column(column.title, justify="left" if column is columns[0] else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*_cells(columns, row), style="red" if row.failure is not None else "dim" if row.quoted else None)
+    return table
+
+
+def _cells(columns: Sequence[Column], row: Row) -> list[str]:
+    cells = [column.cell(row) for column in columns]
+    return cells if row.failure is None else [f"{cells[0]} (FAILED)", *cells[1:]]
+
+
+def _filled(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
+    """The columns in which at least one row has something to say."""
+    return [column for column in columns if any(column.cell(row) != NONE for row in rows)]
+
+
+def _escaped(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")

@@ -21,6 +21,7 @@ from hippodrome.sim.traffic import TrafficSpec, vehicle_types_xml
 from hippodrome.sim.types import Drive, Town
 
 DRIVE_STEP_S: Final = 0.05  # of the ego's car; two steps to one of SUMO's
+ROAM_PER_VEHICLE_M: Final = 200.0  # traffic uses the tour's area and as much around it as keeps queues at signals short
 NEARBY_M: Final = 15.0  # the pose's projection on its lane lies within this of where the path says
 
 
@@ -30,7 +31,8 @@ def simulate_drive(town: Town, tour: TourSpec, traffic: TrafficSpec, ego: EgoSpe
     area = toured_area(graph, (1.0 - tour.revisit_share) * tour.planned_length_m())
     rng_tour, rng_traffic, rng_wander = (np.random.default_rng([seed, stream]) for stream in range(3))
     with sumo_run(town.net_file, vehicle_types_xml(ego.accel_mps2, ego.decel_mps2, LENGTH_M), seed):
-        others = BackgroundTraffic(traffic, town.network, graph, area, rng_traffic)
+        roamed_m = max(float(graph.length_m[area].sum()), ROAM_PER_VEHICLE_M * traffic.vehicles)
+        others = BackgroundTraffic(traffic, town.network, graph, toured_area(graph, roamed_m), rng_traffic)
         log = Pilot(town.network, graph, area, tour, ego, rng_tour).drive(others)
     return _as_drive(town.network, graph, log, ego, rng_wander)
 

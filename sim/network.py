@@ -23,6 +23,7 @@ SumoNet: TypeAlias = Any  # sumolib.net.Net: sumolib has no types
 SumoLane: TypeAlias = Any
 
 MIN_LANE_M: Final = 0.01  # SUMO writes coordinates in centimetres; a shorter lane is a point
+MAX_CHAIN: Final = 6  # internal lanes in a row; netconvert makes up to three
 COINCIDENT_M: Final = 1.0  # nodes closer than this are one crossing to a driver
 
 
@@ -113,6 +114,19 @@ def edge_lengths_m(network: RoadNetwork) -> FloatArray:
     road = ~network.is_internal
     np.maximum.at(length, network.lane_edge[road], network.lane_lengths_m()[road])
     return length
+
+
+def junction_lengths_m(network: RoadNetwork) -> FloatArray:
+    """Mean length (E,) of the ways through the junction behind each edge."""
+    owner = np.repeat(np.arange(network.lane_count), np.diff(network.successor_start))
+    choices = np.maximum(np.bincount(owner, minlength=network.lane_count), 1)
+    through = np.zeros(network.lane_count)
+    for _ in range(MAX_CHAIN):
+        inside = np.where(network.is_internal, network.lane_lengths_m() + through, 0.0)
+        through = np.bincount(owner, weights=inside[network.successor], minlength=network.lane_count) / choices
+    lanes = np.bincount(network.lane_edge, minlength=len(network.edge_ids))
+    mean: FloatArray = np.bincount(network.lane_edge, weights=through, minlength=len(lanes)) / np.maximum(lanes, 1)
+    return mean
 
 
 def check_network(net: SumoNet, network: RoadNetwork, net_file: Path) -> tuple[str, ...]:

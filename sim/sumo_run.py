@@ -20,6 +20,7 @@ from hippodrome.sim.traffic import KIND_SHARES, VEHICLE_SIZES_M, TrafficSpec, ra
 SUMO_STEP_S: Final = 0.1
 EGO: Final = "ego"
 REMOVE_AFTER_S: Final = 60  # vehicles blocked this long, in a knot that SUMO cannot undo, are taken off the road
+ROOM_PER_VEHICLE_M: Final = 100.0  # denser traffic locks small towns up
 SIGHT_M: Final = 150.0  # vehicles farther from the ego are not logged
 
 
@@ -59,13 +60,14 @@ class BackgroundTraffic:
     def __init__(
         self, spec: TrafficSpec, network: RoadNetwork, graph: TourGraph, area: IntArray, rng: np.random.Generator
     ) -> None:
-        self._spec, self._network, self._graph, self._area, self._rng = spec, network, graph, area, rng
+        self._network, self._graph, self._area, self._rng = network, graph, area, rng
+        self._wanted = min(spec.vehicles, int(graph.length_m[area].sum() / ROOM_PER_VEHICLE_M))
         self._kind: list[int] = []  # of each vehicle sent so far, its identity being its number
 
     def refill(self, ego_on_road: bool) -> None:
         """Sends vehicles on their way until the wanted number is on the road or waits for room."""
         there = libsumo.simulation.getMinExpectedNumber() - int(ego_on_road)
-        for _ in range(self._spec.vehicles - there):
+        for _ in range(self._wanted - there):
             number, kind = len(self._kind), int(self._rng.choice(len(KIND_SHARES), p=KIND_SHARES))
             trip = random_trip(self._graph, self._area, self._rng)
             add_vehicle(f"b{number}", f"kind{kind}", self._network, trip, "random_free")

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
-from hippodrome.sim.network import drivable_edges, edge_lengths_m, edge_links
+from hippodrome.sim.network import drivable_edges, edge_lengths_m, edge_links, junction_lengths_m
 from hippodrome.sim.spec import Spec
 
 DEFAULT_LENGTH_M: Final = 3800.0  # once over a default town, in 12 minutes
@@ -47,6 +47,7 @@ class TourGraph:
 
     edges: IntArray  # (K,) index into the network's edge_ids
     length_m: FloatArray  # (K,)
+    junction_m: FloatArray  # (K,) mean way through the junction behind each edge
     middle_m: FloatArray  # (K, 2) halfway between each edge's ends
     cost_m: csr_array  # (K, K) of driving the second edge after the first: its length, the junction, a fine for U-turns
 
@@ -65,7 +66,8 @@ def tour_graph(network: RoadNetwork) -> TourGraph:
     start, end = _edge_headings_rad(network, edges)
     turns_back = np.abs(wrap(start[target] - end[source])) > U_TURN_RAD
     cost = length[target] + JUNCTION_M + U_TURN_COST_M * turns_back
-    return TourGraph(edges, length, _middles_m(network, edges), csr_array((cost, (source, target)), shape=(len(edges),) * 2))
+    costs = csr_array((cost, (source, target)), shape=(len(edges),) * 2)
+    return TourGraph(edges, length, junction_lengths_m(network)[edges], _middles_m(network, edges), costs)
 
 
 def plan_tour(
@@ -86,18 +88,19 @@ def plan_tour(
     here = _roomy_edge(graph, area, rng) if start is None else start
     cost = _liked(graph.cost_m, liking)
     count = np.zeros(len(graph.edges), dtype=np.int32) if visits is None else visits.copy()
-    tour, driven = [here], float(graph.length_m[here])
+    driven_m = graph.length_m + graph.junction_m
+    tour, driven = [here], float(driven_m[here])
     count[here] += 1
     while driven < length_m:
         for edge in _way_to_least_visited(cost, tour[-1], count, area):
             tour.append(edge)
             count[edge] += 1
-            driven += float(graph.length_m[edge])
+            driven += float(driven_m[edge])
     return np.array(tour, dtype=np.int32)
 
 
 def toured_area(graph: TourGraph, length_m: float) -> IntArray:
-    """The edges with the shortest round trips from the middle of the network, as many as make up ``length_m``.
+    """The edges with the shortest round trips from the middle of the network, as many as make up ``length_m``, junctions included.
 
     It depends on the network only, so that two drives of different seeds meet. Every edge on the round trip to a member has no
     longer a round trip itself, so the area is strongly connected.
@@ -106,7 +109,7 @@ def toured_area(graph: TourGraph, length_m: float) -> IntArray:
     round_trip = dijkstra(graph.cost_m, indices=middle) + dijkstra(graph.cost_m.T.tocsr(), indices=middle)
     round_trip[middle] = 0.0
     order = np.argsort(round_trip, kind="stable")
-    enough = int(np.searchsorted(np.cumsum(graph.length_m[order]), length_m))
+    enough = int(np.searchsorted(np.cumsum((graph.length_m + graph.junction_m)[order]), length_m))
     reach = round_trip[order[min(enough, len(order) - 1)]]
     return np.flatnonzero(round_trip <= reach + 1e-6).astype(np.int32)
 

@@ -64,7 +64,8 @@ class Mapper:
         cells = self._memory.finish(self._step_state.spacing)
         config, motions = self._config.experience_map, np.stack(self._motions)
         odometry = experience_map.odometry_edges(motions, config)
-        edges = experience_map.joined(odometry, experience_map.closure_edges(self._closures, config))
+        closures = experience_map.steadied(self._closures, motions, config)
+        edges = experience_map.joined(odometry, experience_map.closure_edges(closures, config))
         t_s, count = np.array(self._t_s), len(motions)
         return CognitiveMap(
             frame="semi-metric",

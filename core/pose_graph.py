@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.sparse import csr_array
 
+from hippodrome.core import se2
 from hippodrome.core.gauss_newton import factorise
 from hippodrome.core.topometric_cost import local_residual
 from hippodrome.core.types import EdgeKind, Edges, FloatArray
@@ -43,7 +44,7 @@ def optimise(poses: FloatArray, edges: Edges, config: PoseGraphConfig) -> FloatA
         weight = np.where(robust, _geman_mcclure(_sq_error(poses, edges), config.robust_scale**2 * widening), 1.0)
         poses = _step(poses, edges, weight)
         widening = max(1.0, widening / config.anneal)
-    return poses
+    return np.concatenate([poses[:, :2], se2.wrap(poses[:, 2:])], axis=1)
 
 
 def closure_weights(poses: FloatArray, edges: Edges, config: PoseGraphConfig) -> FloatArray:

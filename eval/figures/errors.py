@@ -1,0 +1,71 @@
+"""Errors along the drive and their distributions (Fig. 3 D-I, Li et al. 2025)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hippodrome.core.types import FloatArray
+from hippodrome.eval.figures.style import FLOOR_M, SERIES, Axes, log_errors, new_figure, save_figure, tidy
+from hippodrome.eval.metrics import Score
+
+VIOLIN_GRID = 200
+
+
+def draw_error_profiles(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, Score], title: str = "") -> None:
+    """APE above, RPE below, one line a method, over the time of the drive."""
+    figure = new_figure(9.0, 5.6)
+    panels = figure.subplots(2, 1, sharex=True)
+    for axes, scores, name in zip(panels, (ape, rpe), ("APE", "RPE"), strict=True):
+        for (method, score), colour in zip(scores.items(), SERIES, strict=False):
+            label = f"{method}: mean {score.mean_m:.2f} m"
+            axes.plot(score.t_s, np.maximum(score.errors_m, FLOOR_M), color=colour, linewidth=0.9, label=label)
+        tidy(axes, "", f"{name} (m)", title if name == "APE" else "")
+        log_errors(axes, _together(scores))
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
+    panels[1].set_xlabel("time (s)")
+    save_figure(figure, path)
+
+
+def draw_error_violins(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, Score], title: str = "") -> None:
+    """Distribution of APE and RPE per method on a logarithmic axis: median (bar), quartiles (box), mean (diamond)."""
+    methods = max(len(ape), len(rpe), 1)
+    figure = new_figure(2.4 + 2.2 * methods, 4.4)
+    for axes, scores, name in zip(figure.subplots(1, 2), (ape, rpe), ("APE", "RPE"), strict=True):
+        for place, (score, colour) in enumerate(zip(scores.values(), SERIES, strict=False)):
+            _violin(axes, place, score.errors_m, colour)
+        tidy(axes, "", f"{name} (m)", title if name == "APE" else "")
+        axes.set_xticks(range(len(scores)), [method.replace(" ", "\n", 1) for method in scores], fontsize=8)
+        axes.set_xlim(-0.6, len(scores) - 0.4)
+        log_errors(axes, _together(scores))
+    save_figure(figure, path)
+
+
+def _violin(axes: Axes, place: int, errors_m: FloatArray, colour: str) -> None:
+    """A kernel density of log10 error, so that the shape is true on the logarithmic axis."""
+    logs = np.log10(np.maximum(errors_m, FLOOR_M))
+    levels, density = _density(logs)
+    half_width = 0.38 * density / density.max()
+    axes.fill_betweenx(10.0**levels, place - half_width, place + half_width, color=colour, alpha=0.45, linewidth=0)
+    low, median, high = 10.0 ** np.percentile(logs, [25.0, 50.0, 75.0])
+    axes.plot([place, place], [low, high], color=colour, linewidth=5.0, solid_capstyle="butt")
+    axes.plot([place - 0.12, place + 0.12], [median, median], color="white", linewidth=2.0)
+    axes.plot(place, max(float(errors_m.mean()), FLOOR_M), "D", color="white", markeredgecolor="black", markersize=5)
+    axes.annotate(f"{errors_m.mean():.2f}", (place + 0.1, max(float(errors_m.mean()), FLOOR_M)), fontsize=8, va="bottom")
+
+
+def _density(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Gaussian kernel density (levels, density) with Silverman's bandwidth, floored at 2 % of a decade."""
+    width = max(1.06 * float(logs.std()) * len(logs) ** -0.2, 0.02)
+    levels = np.linspace(logs.min() - 2.0 * width, logs.max() + 2.0 * width, VIOLIN_GRID)
+    histogram, edges = np.histogram(logs, bins=VIOLIN_GRID)
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    kernels = np.exp(-0.5 * ((levels[:, np.newaxis] - centres) / width) ** 2)
+    return levels, kernels @ histogram
+
+
+def _together(scores: Mapping[str, Score]) -> Any:
+    return np.concatenate([score.errors_m for score in scores.values()]) if scores else np.zeros(0)

@@ -1,0 +1,100 @@
+"""Maps: over ground truth, as built, and coloured by error (Fig. 3 A-C, Li et al. 2025)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm
+
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.types import CognitiveMap, EdgeKind, FloatArray
+from hippodrome.eval.figures.style import (
+    BLUE,
+    ERROR_MAP,
+    FLOOR_M,
+    ORANGE,
+    ROAD,
+    SERIES,
+    TRUTH,
+    VERMILION,
+    Axes,
+    draw_network,
+    frame_map,
+    new_figure,
+    save_figure,
+)
+
+CLIP_PERCENTILE = 99.0  # one lost vertex must not wash out the colours of all others
+
+
+def draw_maps_over_truth(
+    path: Path, network: RoadNetwork, truth_m: FloatArray, maps_m: Mapping[str, FloatArray], title: str = ""
+) -> None:
+    """Vertices of each map (N, 2 or more columns) over the driven path, on the network in grey."""
+    figure = new_figure(7.2, 6.4)
+    axes = figure.subplots()
+    draw_network(axes, network)
+    axes.plot(truth_m[:, 0], truth_m[:, 1], color=TRUTH, linewidth=1.2, label="ground truth", zorder=2)
+    for (name, positions_m), colour in zip(maps_m.items(), SERIES, strict=False):
+        axes.plot(positions_m[:, 0], positions_m[:, 1], ".", color=colour, markersize=3.5, alpha=0.8, label=name, zorder=3)
+    axes.autoscale_view()
+    axes.set_title(title, loc="left", fontsize=10)
+    _legend_below(figure, axes)
+    save_figure(figure, path)
+
+
+def draw_cognitive_map(path: Path, cognitive_map: CognitiveMap, title: str = "") -> None:
+    """Vertices, odometry edges and loop closures in the map's own frame (Fig. 3A)."""
+    figure = new_figure(7.2, 6.4)
+    axes = figure.subplots()
+    unit = "m" if cognitive_map.frame == "network" else "map units"
+    edges, positions = cognitive_map.edges, cognitive_map.poses[:, :2]
+    ends = np.stack([positions[edges.source], positions[edges.target]], axis=1)
+    is_closure = edges.kind == EdgeKind.CLOSURE
+    for chosen, colour, width, label in (
+        (~is_closure, ROAD, 1.2, "odometry edge"),
+        (is_closure, ORANGE, 0.9, "loop closure"),
+    ):
+        name = f"{label} ({np.count_nonzero(chosen):,})"
+        axes.add_collection(LineCollection(list(ends[chosen]), colors=colour, linewidths=width, label=name, zorder=1))
+    axes.plot(positions[:, 0], positions[:, 1], ".", color=BLUE, markersize=3.0, label=f"vertex ({len(positions):,})", zorder=2)
+    if len(positions):
+        axes.plot(*positions[0], "*", color=VERMILION, markeredgecolor="white", markersize=14, label="start", zorder=3)
+    frame_map(axes, f"x ({unit})", f"y ({unit})")
+    axes.set_title(title, loc="left", fontsize=10)
+    _legend_below(figure, axes)
+    save_figure(figure, path)
+
+
+def draw_error_map(
+    path: Path, network: RoadNetwork, positions_m: FloatArray, errors_m: FloatArray, title: str = "", label: str = "APE (m)"
+) -> None:
+    """Positions (N, 2 or more columns) coloured by their error (N,) on a logarithmic scale (Fig. 3C)."""
+    figure = new_figure(7.6, 6.4)
+    axes = figure.subplots()
+    draw_network(axes, network)
+    top = max(float(np.percentile(errors_m, CLIP_PERCENTILE)), 10.0 * FLOOR_M) if len(errors_m) else 1.0
+    order = np.argsort(errors_m, kind="stable")  # the worst on top
+    dots = axes.scatter(
+        positions_m[order, 0],
+        positions_m[order, 1],
+        c=np.maximum(errors_m[order], FLOOR_M),
+        norm=LogNorm(FLOOR_M, top),
+        cmap=ERROR_MAP,
+        s=12,
+        linewidths=0,
+        zorder=3,
+    )
+    bar = figure.colorbar(dots, ax=axes, label=label, shrink=0.8, extend="max", format=lambda value, _: f"{value:g}")
+    bar.outline.set_visible(False)
+    axes.set_title(title, loc="left", fontsize=10)
+    save_figure(figure, path)
+
+
+def _legend_below(figure: Any, axes: Axes) -> None:
+    """A legend outside the map, where it hides no road."""
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, markerscale=2.0)

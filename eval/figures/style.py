@@ -1,0 +1,74 @@
+"""One look for all figures: Okabe and Ito's colours (told apart by colour-blind readers), no global state, the same bytes."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.proto.atomic import write_atomically
+
+Axes: TypeAlias = Any  # matplotlib ships no types
+
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
+    "#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7",
+)  # fmt: skip
+TRUTH, ROAD, FAINT = "#222222", "#c8c8c8", "#777777"
+SERIES: Final = (VERMILION, BLUE, GREEN, PURPLE, ORANGE, SKY, BLACK)  # in the order in which methods are given
+ERROR_MAP: Final = "viridis"
+DPI = 130
+FLOOR_M = 0.01  # logarithmic error axes begin at a centimetre
+
+
+def new_figure(width_in: float, height_in: float) -> Any:
+    """An empty figure that belongs to no display and no global list."""
+    figure = Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a PNG atomically, without date or program version in it."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", metadata={"Software": None})
+    write_atomically(path, buffer.getvalue())
+
+
+def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
+    """Labels with units, a light grid, no box."""
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    if title:
+        axes.set_title(title, loc="left", fontsize=10)
+    axes.grid(color="#e6e6e6", linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def log_errors(axes: Axes, errors_m: np.ndarray[Any, Any]) -> None:
+    """A logarithmic error axis with plain numbers, from a centimetre to beyond the largest error."""
+    top = max(float(np.max(errors_m, initial=1.0)), 1.0)
+    axes.set_yscale("log")
+    axes.set_ylim(FLOOR_M, 10.0 ** np.ceil(np.log10(top)))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+
+
+def draw_network(axes: Axes, network: RoadNetwork) -> None:
+    """The lanes' centrelines in grey, equal scales, metres."""
+    lines = [network.lane_points_m(lane) for lane in range(network.lane_count)]
+    axes.add_collection(LineCollection(lines, colors=ROAD, linewidths=1.0, zorder=0))
+    frame_map(axes, "x east (m)", "y north (m)")
+
+
+def frame_map(axes: Axes, x_label: str, y_label: str) -> None:
+    """A map's axes: equal scales around all that was drawn."""
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.autoscale_view()
+    tidy(axes, x_label, y_label)

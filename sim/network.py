@@ -24,6 +24,7 @@ SumoLane: TypeAlias = Any
 
 MIN_LANE_M: Final = 0.01  # SUMO writes coordinates in centimetres; a shorter lane is a point
 MAX_CHAIN: Final = 6  # internal lanes in a row; netconvert makes up to three
+HELD_PHASE_S: Final = 150.0  # no driver waits that long: such a traffic light is meant to be switched by hand
 COINCIDENT_M: Final = 1.0  # nodes closer than this are one crossing to a driver
 
 
@@ -36,7 +37,7 @@ def load_net(net_file: Path) -> SumoNet:
     """``sumolib``'s network, internal lanes included; every way of being unreadable is one ``HippodromeError``."""
     _reject_foreign(net_file)
     try:
-        return sumolib.net.readNet(str(net_file), withInternal=True, withFoes=False, lxml=False)
+        return sumolib.net.readNet(str(net_file), withInternal=True, withFoes=False, withPrograms=True, lxml=False)
     except (SAXException, OSError, EOFError, zlib.error) as error:
         raise HippodromeError(f"{net_file}: broken network ({_one_line(error)}); write it again with netconvert") from error
     except (KeyError, AttributeError, ValueError, TypeError, IndexError) as error:
@@ -134,7 +135,7 @@ def check_network(net: SumoNet, network: RoadNetwork, net_file: Path) -> tuple[s
     drivable = drivable_edges(network)
     if len(drivable) == 0:
         raise HippodromeError(f"{net_file}: no closed loop for passenger cars, so no tour can return; add a way round or U-turns")
-    return (*_disconnected(network, drivable), *_zero_length(network), *_coincident(net))
+    return (*_disconnected(network, drivable), *_zero_length(network), *_coincident(net), *_held_signals(net))
 
 
 def _disconnected(network: RoadNetwork, drivable: IntArray) -> Iterable[str]:
@@ -168,6 +169,13 @@ def _coincident(net: SumoNet) -> Iterable[str]:
         if other not in joined:
             x_m, y_m = one.getCoord()[:2]
             yield f"nodes {one.getID()} and {other.getID()} coincide at ({x_m:.1f}, {y_m:.1f}) m but are not connected"
+
+
+def _held_signals(net: SumoNet) -> Iterable[str]:
+    programs = ((signal, program) for signal in net.getTrafficLights() for program in signal.getPrograms().values())
+    held = {signal.getID() for signal, program in programs if any(p.duration > HELD_PHASE_S for p in program.getPhases())}
+    if held:
+        yield f"{len(held)} traffic light(s), for instance {min(held)}, wait for a hand to switch them and are given a cycle"
 
 
 def _parts(count: int, source: IntArray, target: IntArray, connection: str) -> IntArray:

@@ -14,12 +14,14 @@ import numpy as np
 
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
+from hippodrome.sim.network import HELD_PHASE_S
 from hippodrome.sim.tour import TourGraph
 from hippodrome.sim.traffic import KIND_SHARES, VEHICLE_SIZES_M, TrafficSpec, random_trip
 
 SUMO_STEP_S: Final = 0.1
 EGO: Final = "ego"
 REMOVE_AFTER_S: Final = 60  # vehicles blocked this long, in a knot that SUMO cannot undo, are taken off the road
+GREEN_S: Final = 25.0  # of signals that have no timing of their own
 ROOM_PER_VEHICLE_M: Final = 100.0  # denser traffic locks small towns up
 SIGHT_M: Final = 150.0  # vehicles farther from the ego are not logged
 
@@ -47,11 +49,22 @@ def sumo_run(net_file: Path, vehicle_types: str, seed: int) -> Iterator[None]:
         )
         try:
             libsumo.start(["sumo", *options])
+            _let_signals_run()
             yield
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise HippodromeError(f"{net_file}: SUMO failed: {' '.join(str(error).split())}") from error
         finally:
             libsumo.close()
+
+
+def _let_signals_run() -> None:
+    """Signals made to be switched by hand get one program that goes through all phases of all their programs by itself."""
+    for signal in libsumo.trafficlight.getIDList():
+        programs = libsumo.trafficlight.getAllProgramLogics(signal)
+        phases = [phase for program in programs for phase in program.phases]
+        if any(phase.duration > HELD_PHASE_S for phase in phases):
+            cycle = [libsumo.trafficlight.Phase(min(phase.duration, GREEN_S), phase.state) for phase in phases]
+            libsumo.trafficlight.setProgramLogic(signal, libsumo.trafficlight.Logic("by itself", 0, 0, cycle))
 
 
 class BackgroundTraffic:

@@ -100,7 +100,7 @@ def plan_tour(
 
 
 def toured_area(graph: TourGraph, length_m: float) -> IntArray:
-    """The edges with the shortest round trips from the middle of the network, as many as make up ``length_m``, junctions included.
+    """The edges with the shortest round trips from the middle of the network, as many as make ``length_m``, junctions included.
 
     It depends on the network only, so that two drives of different seeds meet. Every edge on the round trip to a member has no
     longer a round trip itself, so the area is strongly connected.

@@ -25,7 +25,7 @@ class PoseGraphConfig:
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
     robust_scale: float = 3.0  # sigmas at which a closure's weight has fallen to a quarter
-    rounds: int = 10  # of re-weighting, one Gauss-Newton step each
+    rounds: int = 15  # of re-weighting, one Gauss-Newton step each
     anneal: float = 4.0  # the loss narrows by this factor a round
 
     def __post_init__(self) -> None:

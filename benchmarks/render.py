@@ -121,6 +121,7 @@ def _moderngl(scene: Scene, camera: CameraSpec, poses: FloatArray) -> tuple[floa
 
     context = moderngl.create_context(standalone=True, backend="egl")
     program = context.program(vertex_shader=VERTEX_SHADER, fragment_shader=FRAGMENT_SHADER)
+    # No glDepthRange here: the dome is drawn just inside the far plane instead.
     far_sky = replace(
         scene.sky, vertices_m=scene.sky.vertices_m * np.float32(0.97 * FAR_M / DOME_RADIUS_M)
     )  # no glDepthRange here

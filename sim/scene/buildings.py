@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from hippodrome.core.types import FloatArray, IntArray
 from hippodrome.sim.scene.mesh import Mesh, Surface, boxes, merge, placed, polygons, turned
@@ -30,6 +31,7 @@ TOWN_MIX: Final = np.array([0.40, 0.10, 0.02, 0.10, 0.22, 0.12, 0.02, 0.02])
 STOREY_M: Final = 2.9
 EAVES_M: Final = 0.45  # overhang of pitched roofs
 ROAD_CLEARANCE_M: Final = 2.0  # a pavement's width between wall and asphalt
+LONELY_M: Final = 24.0  # from a road's border to the nearest building
 GAP_M: Final = 1.5  # between buildings
 
 FACADES: Final = np.array(
@@ -74,14 +76,25 @@ class Buildings:
 
 
 def place_buildings(border: Border, town_share: FloatArray, roads: Shapes, fields: Shapes, rng: np.random.Generator) -> Buildings:
-    """Two rows along the roads, off the fields; ``town_share`` (B,) mixes the rural kinds with those of a town."""
+    """Two rows along the roads, off the fields; ``town_share`` (B,) mixes the rural kinds with those of a town.
+
+    Stretches that stay lonely get a second round, since a road without any building in view cannot be recognised.
+    """
     sparse = 1.0 + 0.5 * (1.0 - town_share)
     front = _propose(border, town_share, spacing_m=10.0 * sparse, behind_m=(0.0, 4.0), stray_rad=0.12, rng=rng)
     back = _propose(border, town_share, spacing_m=14.0 * sparse, behind_m=(14.0, 48.0), stray_rad=0.6, rng=rng)
-    proposed = join([front, back])
+    first = _admitted(join([front, back]), roads, fields)
+    lonely = KDTree(first.centre_m).query(border.point_m)[0] > LONELY_M
+    spacing = np.full(int(lonely.sum()), 5.0)  # many proposals, of which few find room
+    second = _propose(border.select(lonely), town_share[lonely], spacing, behind_m=(0.0, 20.0), stray_rad=0.5, rng=rng)
+    return _admitted(join([first, second]), roads, fields)
+
+
+def _admitted(proposed: Buildings, roads: Shapes, fields: Shapes) -> Buildings:
+    """Those that stand clear of roads and fields, and of the ones before them."""
     footprints = proposed.footprints()
-    proposed = proposed.select(clear_of(footprints, roads, ROAD_CLEARANCE_M) & clear_of(footprints, fields, GAP_M))
-    return proposed.select(spread(proposed.footprints(), GAP_M))
+    clear = clear_of(footprints, roads, ROAD_CLEARANCE_M) & clear_of(footprints, fields, GAP_M)
+    return proposed.select(np.flatnonzero(clear)[spread(footprints[clear], GAP_M)])
 
 
 def join(groups: list[Buildings]) -> Buildings:

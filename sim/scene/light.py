@@ -52,7 +52,7 @@ def light_of(conditions: Conditions) -> Light:
 def shade(albedo: FloatArray | Float32Array, normals: FloatArray | Float32Array, light: Light) -> UInt8Array:
     """Lambert's law under the sun and a hemisphere of sky over ground; albedo (n, 3) in sRGB, normals (n, 3)."""
     lit = np.clip(normals @ light.sun_direction, 0.0, None)[:, None] * light.sun
-    up = 0.5 + 0.5 * np.asarray(normals)[:, 2:]
+    up = 0.5 + 0.5 * np.asarray(normals, dtype=np.float64)[:, 2:]
     radiance = np.asarray(albedo, dtype=np.float64) ** 2.2 * (lit + up * light.sky + (1.0 - up) * light.ground)
     return to_levels(np.clip(radiance, 0.0, 1.0) ** (1.0 / 2.2))
 
@@ -97,8 +97,8 @@ def _horizon(conditions: Conditions) -> FloatArray:
 
 
 def sky_dome(conditions: Conditions) -> Tile:
-    """Inside of a dome: haze at the horizon, darker above, a glow around the sun. No clouds: they would serve as a compass."""
-    elevation_rad = np.radians([-12.0, 0.0, 4.0, 10.0, 20.0, 38.0, 60.0, 90.0])
+    """Inside of a sphere: haze at and below the horizon, darker above, a glow around the sun. Clouds would serve as a compass."""
+    elevation_rad = np.radians([-90.0, 0.0, 4.0, 10.0, 20.0, 38.0, 60.0, 90.0])
     azimuth_rad = np.linspace(0.0, 2.0 * np.pi, 33)
     azimuth, elevation = np.meshgrid(azimuth_rad, elevation_rad)
     ray = np.stack([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)], axis=-1)

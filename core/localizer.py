@@ -7,6 +7,7 @@ injected where it agrees with the belief; where it does not, it becomes a challe
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import TypeAlias
 
@@ -16,6 +17,7 @@ from hippodrome.core import localizer_places, view_cells, view_step
 from hippodrome.core.localizer_attractor import AttractorPose
 from hippodrome.core.localizer_config import Injection, LocalizerConfig
 from hippodrome.core.localizer_kalman import KalmanPose
+from hippodrome.core.localizer_motion import Motion
 from hippodrome.core.localizer_paper import PaperPose
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.sequence_filter import standardise
@@ -73,8 +75,8 @@ class Localizer:
     def _move(self, observation: Observation) -> None:
         travelled, turned_rad = observation.speed * observation.dt_s, observation.yaw_rate_radps * observation.dt_s
         self._view_step = view_step.advance(self._view_step, observation, self._config.steps)
-        self._belief = self._belief.predict(travelled, turned_rad, observation.dt_s)
-        self._step_m += travelled * float(np.exp(_log_scale(self._belief)))
+        self._belief = self._belief.predict(Motion(travelled, turned_rad, observation.dt_s))
+        self._step_m += travelled * math.exp(self._belief.log_scale)
         self._turned_rad += turned_rad
 
     def _look(self, frame: Frame) -> None:
@@ -82,7 +84,7 @@ class Localizer:
         descriptor = view_cells.describe(frame, config.views)
         self._query_mean = view_cells.update_query_mean(self._query_mean, descriptor, config.views)
         scores = view_cells.score(places.bank, descriptor, self._query_mean, config.views)
-        similarity, _ = view_cells.best_over_shifts(scores, config.views.max_shift)
+        similarity: Float32Array = scores.max(axis=1)  # over the sideways shifts
         self._filtered = self._filter(similarity)
         self._cell = int(np.argmax(self._filtered))
         self._margin = localizer_places.margin(places, self._filtered, self._cell)
@@ -154,10 +156,6 @@ def _unknown(cognitive_map: CognitiveMap, config: LocalizerConfig) -> PoseBelief
     if config.mode == "kalman":
         return KalmanPose.uniform(centre_m, log_scale, config)
     return AttractorPose.uniform(centre_m, log_scale, config)
-
-
-def _log_scale(belief: PoseBelief) -> float:
-    return float(belief.incumbent.mean[3]) if isinstance(belief, KalmanPose) else belief.log_scale
 
 
 def _activity(belief: PoseBelief) -> dict[str, FloatArray]:

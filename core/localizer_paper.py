@@ -16,6 +16,7 @@ from hippodrome.core import grid_cells, head_direction
 from hippodrome.core.grid_cells import GridState
 from hippodrome.core.head_direction import HeadDirectionState
 from hippodrome.core.localizer_config import Injection, LocalizerConfig
+from hippodrome.core.localizer_motion import Motion
 from hippodrome.core.types import FloatArray
 
 
@@ -49,18 +50,14 @@ class PaperPose:
         _, r_position = grid_cells.read_out(self.grid, self.position_m)
         return np.diag([1.0 / r_position[0], 1.0 / r_position[1], 1.0 / r_heading])
 
-    @property
-    def challenged(self) -> bool:
-        return False
-
-    def predict(self, travelled: float, turned_rad: float, dt_s: float) -> Self:
+    def predict(self, motion: Motion) -> Self:
         """Path integration, mutual inhibition, global inhibition."""
-        head = head_direction.integrate(self.head, turned_rad / dt_s, dt_s)
-        head = head_direction.inhibit(head, dt_s, self.config.paper.head)
+        head = head_direction.integrate(self.head, motion.turned_rad / motion.dt_s, motion.dt_s)
+        head = head_direction.inhibit(head, motion.dt_s, self.config.paper.head)
         heading_rad, _ = head_direction.read_out(head)
-        step = grid_cells.displacement(np.full(2, heading_rad), travelled * math.exp(self.log_scale), 1.0)
+        step = grid_cells.displacement(np.full(2, heading_rad), motion.travelled * math.exp(self.log_scale), 1.0)
         grid = grid_cells.integrate(self.grid, step, np.zeros(2))
-        grid = grid_cells.inhibit(grid, dt_s, self.config.paper.grid)
+        grid = grid_cells.inhibit(grid, motion.dt_s, self.config.paper.grid)
         position_m, _ = grid_cells.read_out(grid, self.position_m + step[0])
         return replace(self, head=head, grid=grid, position_m=position_m)
 
@@ -73,7 +70,3 @@ class PaperPose:
         grid = grid_cells.stimulate(self.grid, injection.pose[:2], reliability)
         position_m, _ = grid_cells.read_out(grid, self.position_m if self.placed else injection.pose[:2])
         return replace(self, head=head, grid=grid, position_m=position_m, placed=True)
-
-    def sq_distance(self, injection: Injection, challenger: bool = False) -> float:
-        """Nothing conflicts: the printed networks take every injection."""
-        return 0.0

@@ -119,9 +119,18 @@ def propagate(
 
 def margin(places: Places, filtered: Float32Array, best: int) -> float:
     """How far the best cell stands out from the best one elsewhere; 0 when there is no elsewhere."""
-    gap = places.poses_m[:, :2] - places.poses_m[best, :2]
-    elsewhere = gap[:, 0] ** 2 + gap[:, 1] ** 2 > SAME_PLACE_M**2
-    return float(filtered[best] - filtered[elsewhere].max()) if elsewhere.any() else 0.0
+    rival = _best_elsewhere(places.poses_m, filtered, best)
+    return float(filtered[best]) - rival if rival > -math.inf else 0.0
+
+
+@njit(cache=True)
+def _best_elsewhere(poses_m: FloatArray, filtered: Float32Array, best: int) -> float:
+    rival = -math.inf
+    for j in range(len(filtered)):
+        apart = (poses_m[j, 0] - poses_m[best, 0]) ** 2 + (poses_m[j, 1] - poses_m[best, 1]) ** 2
+        if filtered[j] > rival and apart > SAME_PLACE_M**2:
+            rival = filtered[j]
+    return rival
 
 
 def interpolated_pose(places: Places, similarity: Float32Array, cell: int) -> FloatArray:

@@ -11,19 +11,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from hippodrome.core.chain_solver import ChainFactor, marginals, solve_coupled
+from hippodrome.core.matching.confidence import ConfidenceConfig, breaks, judge
 from hippodrome.core.matching.route_line import RouteLine, route_line
-from hippodrome.core.matching.route_search import RouteSearchConfig, search_route
-from hippodrome.core.noise_estimation import Noise, per_freedom, reestimated
-from hippodrome.core.refinement_residuals import (
-    State,
-    Targets,
-    closures,
-    moved,
-    normal_equations,
-    odometry,
-    road,
-)
+from hippodrome.core.matching.route_search import Route, RouteSearchConfig, search_route
+from hippodrome.core.refinement_solver import Solution, SolverConfig, optimise
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import (
     CognitiveMap,
@@ -35,7 +26,7 @@ from hippodrome.core.types import (
     Refinement,
     RoadMatch,
     StartPose,
-    Visits,
+    UInt8Array,
 )
 
 
@@ -46,17 +37,8 @@ class DefaultRefineConfig:
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     search: RouteSearchConfig = field(default_factory=RouteSearchConfig)
-    along_sigma_m: tuple[float, ...] = (3.0, 6.0, 12.0, np.inf, np.inf, np.inf, np.inf, np.inf)  # per outer round: let go slowly
-    inner_iterations: int = 3
-    reprojection_m: float = 4.0  # arc length that a vertex may slide in one round
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Solution:
-    state: State
-    arc_m: FloatArray  # (S,) on the route line
-    noise: Noise
-    covariance: FloatArray  # (S, 4, 4)
+    confidence: ConfidenceConfig = field(default_factory=ConfidenceConfig)
+    solver: SolverConfig = field(default_factory=SolverConfig)
 
 
 def refine_default(
@@ -65,11 +47,19 @@ def refine_default(
     """The topometric map, from an unknown start unless one is given."""
     visits = cognitive_map.visits
     route = search_route(visits, network, config.search, start)
+    status = visit_status(route, judge(route, config.confidence))
     line, state_arc = route_line(route, network)
     arc = np.interp(route.track.visit_arc, route.track.arc, state_arc)
     log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
-    solution = optimise(visits, closure_edges(cognitive_map), line, arc, log_scale, config)
-    return _refinement(cognitive_map, network, line, solution)
+    vouched = (status != MatchStatus.OFF_NETWORK).astype(np.float64)
+    solution = optimise(visits, closure_edges(cognitive_map), line, arc, log_scale, vouched, config.solver)
+    return _refinement(cognitive_map, network, line, solution, status)
+
+
+def visit_status(route: Route, sample_status: UInt8Array) -> UInt8Array:
+    """Status (S,) of the visits: that of the nearest sample of the track."""
+    nearest = np.round(route.track.visit_arc / route.track.step).astype(np.int64)
+    return sample_status[np.clip(nearest, 0, len(sample_status) - 1)]
 
 
 def closure_edges(cognitive_map: CognitiveMap) -> Edges:
@@ -78,12 +68,12 @@ def closure_edges(cognitive_map: CognitiveMap) -> Edges:
     kept = edges.kind == EdgeKind.CLOSURE
     first = first_visits(cognitive_map)
     return Edges(
-        first[edges.source[kept]],
-        first[edges.target[kept]],
-        edges.motion[kept],
-        edges.sigma[kept],
-        edges.kind[kept],
-        edges.margin[kept],
+        source=first[edges.source[kept]],
+        target=first[edges.target[kept]],
+        motion=edges.motion[kept],
+        sigma=edges.sigma[kept],
+        kind=edges.kind[kept],
+        margin=edges.margin[kept],
     )
 
 
@@ -95,96 +85,40 @@ def first_visits(cognitive_map: CognitiveMap) -> IntArray:
     return first
 
 
-def optimise(
-    visits: Visits, edges: Edges, line: RouteLine, arc_m: FloatArray, log_scale: FloatArray, config: DefaultRefineConfig
-) -> Solution:
-    """Gauss-Newton rounds: project onto the line, solve, estimate the noise anew."""
-    points, heading = _on_line(line, arc_m)
-    state = State(np.column_stack([points, heading]), log_scale, np.zeros(2))
-    noise = Noise()
-    for along_sigma_m in config.along_sigma_m:
-        arc_m = reproject(line, state.poses[:, :2], arc_m, config.reprojection_m)
-        points, heading = _on_line(line, arc_m)
-        targets = Targets(points, heading, np.ones(len(points)), along_sigma_m)
-        for _ in range(config.inner_iterations):
-            state, factor = gauss_newton_step(state, visits, edges, targets, noise)
-        noise = estimate_noise(state, visits, edges, targets, noise, factor)
-    covariance, _ = marginals(factor)
-    return Solution(state, arc_m, noise, covariance)
-
-
-def gauss_newton_step(state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise) -> tuple[State, ChainFactor]:
-    tied = closures(state, edges, noise)
-    system = normal_equations(
-        state, odometry(state, visits, noise), road(state, targets, noise), tied, edges.source, edges.target
-    )
-    cross = np.einsum("nmi,nmj->nij", tied.here, tied.there)
-
-    def couple(x: FloatArray) -> FloatArray:
-        product = np.zeros_like(x)
-        np.add.at(product, edges.source, np.einsum("nij,nj->ni", cross, x[edges.target]))
-        np.add.at(product, edges.target, np.einsum("nij,ni->nj", cross, x[edges.source]))
-        return product
-
-    step, gyro_step, factor = solve_coupled(system, couple, 1e-4, 100)
-    return moved(state, step, gyro_step), factor
-
-
-def estimate_noise(state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise, factor: ChainFactor) -> Noise:
-    """Squared whitened residuals per degree of freedom left, by kind."""
-    own, next_ = marginals(factor)
-    steps, roads, tied = odometry(state, visits, noise), road(state, targets, noise), closures(state, edges, noise)
-    joint = np.block([[own[:-1], next_], [np.swapaxes(next_, 1, 2), own[1:]]])
-    both = np.concatenate([steps.here, steps.there], axis=2)
-    steps_used = np.einsum("nmi,nij,nmj->m", both, joint, both)
-    roads_used = np.einsum("nmi,nij,nmj->m", roads.here, own, roads.here)
-    plain_sq = np.sum(tied.residual**2, axis=1) / np.maximum(tied.weight[:, 0], 1e-12)
-    return reestimated(
-        noise,
-        per_freedom(steps.residual, steps.weight, steps_used),
-        per_freedom(roads.residual, roads.weight, roads_used),
-        float(np.median(plain_sq)) if len(plain_sq) else None,
-    )
-
-
-def reproject(line: RouteLine, points_m: FloatArray, arc_m: FloatArray, reach_m: float) -> FloatArray:
-    """Arc length (S,) of the nearest place on the line within ``reach_m`` of the present one."""
-    spacing = (line.arc_m[-1] - line.arc_m[0]) / max(len(line.arc_m) - 1, 1)
-    window = np.arange(-int(np.ceil(reach_m / spacing)), int(np.ceil(reach_m / spacing)) + 1)
-    middle = np.searchsorted(line.arc_m, arc_m)
-    index = np.clip(middle[:, None] + window, 0, len(line.arc_m) - 1)
-    gap = points_m[:, None] - line.points_m[index]
-    best = index[np.arange(len(index)), np.argmin(np.sum(gap**2, axis=2), axis=1)]
-    cos, sin = np.cos(line.heading_rad[best]), np.sin(line.heading_rad[best])
-    off = points_m - line.points_m[best]
-    ahead = np.clip(cos * off[:, 0] + sin * off[:, 1], -spacing, spacing)
-    return line.arc_m[best] + ahead
-
-
-def _on_line(line: RouteLine, arc_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Points (S, 2) and headings (S,) at arc lengths; beyond the line's ends it runs straight on."""
-    heading = np.interp(arc_m, line.arc_m, np.unwrap(line.heading_rad))
-    points = np.column_stack([np.interp(arc_m, line.arc_m, line.points_m[:, axis]) for axis in (0, 1)])
-    beyond = arc_m - np.clip(arc_m, line.arc_m[0], line.arc_m[-1])
-    return points + beyond[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), heading
-
-
-def _refinement(cognitive_map: CognitiveMap, network: RoadNetwork, line: RouteLine, solution: Solution) -> Refinement:
+def _refinement(
+    cognitive_map: CognitiveMap, network: RoadNetwork, line: RouteLine, solution: Solution, visit_status: UInt8Array
+) -> Refinement:
     first = first_visits(cognitive_map)
-    sample = np.clip(np.searchsorted(line.arc_m, solution.arc_m[first]), 0, len(line.arc_m) - 1)
-    lane = line.lane[sample]
-    position = np.clip(line.position_m[sample] + solution.arc_m[first] - line.arc_m[sample], 0.0, network.lane_lengths_m()[lane])
-    match = RoadMatch(network.lane_ids, lane.astype(np.int32), position, np.full(len(first), MatchStatus.MATCHED, dtype=np.uint8))
+    status = visit_status[first]
     refined = replace(
         cognitive_map,
         frame="network",
         poses=solution.state.poses[first],
         log_scale=solution.state.log_scale[first],
-        covariance=solution.covariance[first][:, :3, :3],
-        road_match=match,
+        covariance=_covariance(solution.covariance[first][:, :3, :3], network, status),
+        road_match=_road_match(network, line, solution.arc_m[first], status),
     )
+    return Refinement(refined, breaks(status), _estimates(solution))
+
+
+def _road_match(network: RoadNetwork, line: RouteLine, arc_m: FloatArray, status: UInt8Array) -> RoadMatch:
+    sample = np.clip(np.searchsorted(line.arc_m, arc_m), 0, len(line.arc_m) - 1)
+    matched = (status == MatchStatus.MATCHED) & (line.lane[sample] >= 0)
+    lane = np.where(matched, line.lane[sample], -1).astype(np.int32)
+    position = np.clip(line.position_m[sample] + arc_m - line.arc_m[sample], 0.0, network.lane_lengths_m()[lane])
+    return RoadMatch(network.lane_ids, lane, np.where(matched, position, np.nan), status)
+
+
+def _covariance(covariance: FloatArray, network: RoadNetwork, status: UInt8Array) -> FloatArray:
+    """Where the route is ambiguous, the place is as good as unknown: the variance of a place anywhere in the network is added."""
+    anywhere = np.diag([*np.var(network.points_m, axis=0), 0.0])
+    added: FloatArray = covariance + (status == MatchStatus.AMBIGUOUS)[:, None, None] * anywhere
+    return added
+
+
+def _estimates(solution: Solution) -> dict[str, float]:
     noise = solution.noise
-    estimates = {
+    return {
         "odometry_along_m_per_root_m": noise.along,
         "odometry_across_m_per_root_m": noise.across,
         "odometry_heading_rad_per_root_m": noise.heading,
@@ -195,4 +129,3 @@ def _refinement(cognitive_map: CognitiveMap, network: RoadNetwork, line: RouteLi
         "gyro_gain_error": float(solution.state.gyro[0]),
         "gyro_bias_radps": float(solution.state.gyro[1]),
     }
-    return Refinement(refined, (), estimates)

@@ -64,6 +64,29 @@ def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BinCells:
+    """Bins by square cells of the plane, row-major: cell ``c`` holds ``bin[start[c]:start[c + 1]]``."""
+
+    start: IntArray  # (rows * columns + 1,)
+    bin: IntArray  # (N,)
+    origin_m: tuple[float, float]
+    size_m: float
+    columns: int
+    rows: int
+
+
+def bin_cells(graph: LaneGraph, size_m: float = 10.0) -> BinCells:
+    """Index of the bins by place; cells of about the radius of a search keep its number of cells near 9."""
+    low = graph.points_m.min(axis=0)
+    cell = ((graph.points_m - low) / size_m).astype(np.int64)
+    columns, rows = (int(n) + 1 for n in cell.max(axis=0))
+    number = cell[:, 1] * columns + cell[:, 0]
+    order = np.argsort(number, kind="stable").astype(np.int32)
+    start = np.searchsorted(number[order], np.arange(rows * columns + 1)).astype(np.int32)
+    return BinCells(start, order, (float(low[0]), float(low[1])), size_m, columns, rows)
+
+
 def _points_at(network: RoadNetwork, lane: IntArray, position_m: FloatArray) -> FloatArray:
     """Points (N, 2) at arc lengths on lanes."""
     steps = np.linalg.norm(np.diff(network.points_m, axis=0), axis=1)

@@ -3,20 +3,37 @@
 A hypothesis is (bin, scale bin) with two carried values: the heading offset between odometry and network, and the part of the
 driven length that the bins could not express. Carrying them makes the search exact in length over any number of bins and
 invariant to translation and rotation, at the price that they follow the survivor (as in any particle-like Viterbi).
+
+Beside these there are hypotheses off the network, moved by dead reckoning. They keep their index into the arrays ``off_*`` as a
+negative bin. A route may leave the network where it is well known and come back near where dead reckoning ends.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, TypeAlias
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+# What the callers of a compiled function must keep in order; numba takes tuples, not dataclasses.
+Tables: TypeAlias = tuple[Any, ...]  # reach_start, reach_bin, reach_m, reach_changes, bin heading, bin lane
+Costs: TypeAlias = tuple[float, ...]  # heading sigma, its limit, offset gain, half a bin, length sigma, scale step, lane change
+OffNetwork: TypeAlias = tuple[Any, ...]  # see ``expand_off``; then leave (nats), per step (nats), spread (nats)
+Survivors: TypeAlias = tuple[Any, ...]  # see ``forward``
 
 _NOWHERE = np.float32(-1e30)
+_MOST_SUCCESSORS = (
+    2048  # of one hypothesis: three scale bins x a few bins x the branches of a junction, or the bins round a place
+)
+_MOST_OFF = 192  # hypotheses off the network in one step; beyond this the worst gives way
+_SAME_PLACE_M = 4.0  # closer than this, two hypotheses off the network count as one
+_KNOWN_LANES = 30  # good hypotheses on more lanes than this: the route is not known, so nothing can be said to leave the network
 
 
 @njit(cache=True, inline="always")
-def wrap(angle):  # type: ignore[no-untyped-def]
+def wrap(angle: float) -> float:
     """An angle into [-pi, pi]; the callers' sums lie within a few turns, where this is far quicker than a modulo."""
     while angle > math.pi:
         angle -= 2.0 * math.pi
@@ -26,13 +43,23 @@ def wrap(angle):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def expand(bin_, k, offset, rest, heading, step, scales, tables, costs, out):  # type: ignore[no-untyped-def]
-    """Successors of one hypothesis over one step. Rows of ``out``: bin, scale bin, log likelihood, offset, rest. Returns the count.
+def expand(
+    bin_: int,
+    k: int,
+    offset: float,
+    rest: float,
+    heading: float,
+    step: float,
+    scales: NDArray[Any],
+    tables: Tables,
+    costs: Costs,
+    out: NDArray[Any],
+) -> int:
+    """Successors of one hypothesis over one step, counted. Rows of ``out``: bin, scale bin, log likelihood, offset, rest.
 
-    ``costs``: heading sigma (rad), its limit (nats), offset gain, half a bin (m), length sigma (m), scale step and lane change (nats).
     A bin either side of the predicted length is tried, for corners cut or swung out.
     """
-    start, reach_bin, reach_m, reach_changes, bin_heading = tables
+    start, reach_bin, reach_m, reach_changes, bin_heading, _ = tables
     sigma, limit, gain, half, length_sigma, scale_cost, change_cost = costs
     count = 0
     first, last = start[bin_], start[bin_ + 1]
@@ -68,7 +95,48 @@ def expand(bin_, k, offset, rest, heading, step, scales, tables, costs, out):  #
 
 
 @njit(cache=True)
-def grown(array, size):  # type: ignore[no-untyped-def]
+def expand_off(
+    x: float,
+    y: float,
+    away: float,
+    k: int,
+    offset: float,
+    heading: float,
+    tables: Tables,
+    costs: Costs,
+    off: OffNetwork,
+    out: NDArray[Any],
+) -> int:
+    """Bins on which a hypothesis at (x, y) may come back to the network, counted; rows of ``out`` as in ``expand``."""
+    bin_heading, sigma, limit, gain = tables[4], costs[0], costs[1], costs[2]
+    points, cell_start, cell_bin, origin_x, origin_y, cell_m, columns, rows, enter, drift, turn_limit = off[:11]
+    spread = 2.0 + drift * away
+    radius = 2.5 * spread
+    count = 0
+    column_0 = max(int((x - radius - origin_x) / cell_m), 0)
+    column_1 = min(int((x + radius - origin_x) / cell_m), columns - 1)
+    for row in range(max(int((y - radius - origin_y) / cell_m), 0), min(int((y + radius - origin_y) / cell_m), rows - 1) + 1):
+        for c in range(
+            cell_start[row * columns + column_0], cell_start[row * columns + column_1 + 1] if column_1 >= column_0 else 0
+        ):
+            bin_ = cell_bin[c]
+            gap_sq = (points[bin_, 0] - x) ** 2 + (points[bin_, 1] - y) ** 2
+            turn = wrap(bin_heading[bin_] - heading - offset)
+            if gap_sq > radius * radius or abs(turn) > turn_limit:
+                continue
+            if count == out.shape[0]:
+                return count
+            out[count, 0] = bin_
+            out[count, 1] = k
+            out[count, 2] = -(enter + 0.5 * gap_sq / spread**2 + min(0.5 * (turn / sigma) ** 2, limit))
+            out[count, 3] = wrap(offset + gain * min(max(turn, -3.0 * sigma), 3.0 * sigma))
+            out[count, 4] = 0.0
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def grown(array: NDArray[Any], size: int) -> NDArray[Any]:
     """A copy with room for ``size`` rows, at least doubled."""
     bigger = np.empty(max(size, 2 * array.shape[0]), array.dtype)
     bigger[: array.shape[0]] = array
@@ -76,32 +144,84 @@ def grown(array, size):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def forward(headings, step, scales, tables, costs, beam, most, enough, seeds):  # type: ignore[no-untyped-def]
-    """Beam search over T headings, of at most ``most`` survivors a step. It ends early once no more than ``enough`` survive.
+def leavers(
+    begin: int, end: int, bin_: NDArray[Any], score: NDArray[Any], spread: float, lane: NDArray[Any], slot: NDArray[Any]
+) -> NDArray[Any]:
+    """The best survivor on each lane, among those within ``spread`` of the best; none if these are on too many lanes."""
+    best = _NOWHERE
+    for i in range(begin, end):
+        best = max(best, score[i])
+    rows, count = np.empty(_KNOWN_LANES, np.int64), 0
+    known = True
+    for i in range(begin, end):
+        if bin_[i] < 0 or score[i] < best - spread:
+            continue
+        at = slot[lane[bin_[i]]]
+        if at >= 0:
+            if score[i] > score[rows[at]]:
+                rows[at] = i
+        elif count == _KNOWN_LANES:
+            known = False
+            break
+        else:
+            slot[lane[bin_[i]]] = count
+            rows[count] = i
+            count += 1
+    for c in range(count):
+        slot[lane[bin_[rows[c]]]] = -1
+    return rows[:count] if known else rows[:0]
+
+
+@njit(cache=True)
+def forward(
+    headings: NDArray[Any],
+    step: float,
+    scales: NDArray[Any],
+    tables: Tables,
+    costs: Costs,
+    off: OffNetwork,
+    beam: float,
+    most: int,
+    enough: int,
+    seeds: tuple[Any, ...],
+) -> Survivors:
+    """Beam search over T headings, of at most about ``most`` survivors a step. It ends early once no more than ``enough`` survive.
 
     ``seeds``: bin, scale bin, score, offset, rest of the hypotheses at heading 0.
-    Returns the survivors of the t <= T steps searched: row_start (t + 1,), bin, scale bin, parent (row), score, offset, rest.
+    Returns the survivors of the t <= T steps searched: row_start (t + 1,), bin, scale bin, parent (row), score, offset, rest,
+    and of those off the network: place (M, 2), metres driven since they left.
     """
     seed_bin, seed_k, seed_score, seed_offset, seed_rest = seeds
-    times, scale_count = headings.shape[0], scales.shape[0]
+    times, scale_count, points, lane = headings.shape[0], scales.shape[0], off[0], tables[5]
+    leave_cost, off_cost, off_spread = off[11], off[12], off[13]
     size = seed_bin.shape[0]
     room = max(4 * size, 1 << 16)
     bin_, k, parent = np.empty(room, np.int32), np.empty(room, np.uint8), np.empty(room, np.int32)
     score, offset, rest = np.empty(room, np.float32), np.empty(room, np.float32), np.empty(room, np.float32)
     bin_[:size], k[:size], parent[:size] = seed_bin, seed_k, -1
     score[:size], offset[:size], rest[:size] = seed_score, seed_offset, seed_rest
+    off_x, off_y, off_away, off_size = np.empty(1024, np.float32), np.empty(1024, np.float32), np.empty(1024, np.float32), 0
     row_start = np.zeros(times + 1, np.int64)
     row_start[1] = size
     slot = np.full((tables[0].shape[0] - 1) * scale_count, -1, np.int32)
-    out = np.empty((512, 5))
+    lane_slot = np.full(lane.max() + 1, -1, np.int32)
+    out = np.empty((_MOST_SUCCESSORS, 5))
     for t in range(1, times):
         begin, end = row_start[t - 1], row_start[t]
         size, best = end, _NOWHERE
+        off_begin = off_size
+        course = 0.5 * (headings[t - 1] + headings[t])
         for i in range(begin, end):
-            found = expand(bin_[i], int(k[i]), offset[i], rest[i], headings[t], step, scales, tables, costs, out)
-            if size + found >= bin_.shape[0]:
-                bin_, k, parent = grown(bin_, size + found), grown(k, size + found), grown(parent, size + found)
-                score, offset, rest = grown(score, size + found), grown(offset, size + found), grown(rest, size + found)
+            if bin_[i] >= 0:
+                found = expand(bin_[i], int(k[i]), offset[i], rest[i], headings[t], step, scales, tables, costs, out)
+            else:
+                j, far = -1 - bin_[i], step * scales[k[i]]
+                x, y = off_x[j] + far * math.cos(course + offset[i]), off_y[j] + far * math.sin(course + offset[i])
+                found = expand_off(x, y, off_away[j] + far, int(k[i]), offset[i], headings[t], tables, costs, off, out)
+            if size + found + _MOST_OFF >= bin_.shape[0]:
+                wanted = size + found + _MOST_OFF + 1
+                bin_, k, parent = grown(bin_, wanted), grown(k, wanted), grown(parent, wanted)
+                score, offset, rest = grown(score, wanted), grown(offset, wanted), grown(rest, wanted)
             for c in range(found):
                 total = score[i] + out[c, 2]
                 if total < best - beam:
@@ -117,11 +237,51 @@ def forward(headings, step, scales, tables, costs, beam, most, enough, seeds):  
                     continue
                 bin_[at], k[at], parent[at], score[at] = int(out[c, 0]), int(out[c, 1]), i, total
                 offset[at], rest[at] = out[c, 3], out[c, 4]
-        kept, bar = end, best - beam
+        kept = end
+        on_network = size
+        going = leavers(begin, end, bin_, score, off_spread, lane, lane_slot)
+        if off_size + _MOST_OFF >= off_x.shape[0]:
+            off_x, off_y, off_away = grown(off_x, 0), grown(off_y, 0), grown(off_away, 0)
+        for n in range(begin, end + going.shape[0]):
+            i = n if n < end else going[n - end]
+            if n < end and bin_[i] >= 0:
+                continue
+            far = step * scales[k[i]]
+            x, y = far * math.cos(course + offset[i]), far * math.sin(course + offset[i])
+            if bin_[i] < 0:
+                total, away = score[i] - off_cost, off_away[-1 - bin_[i]] + far
+                x, y = x + off_x[-1 - bin_[i]], y + off_y[-1 - bin_[i]]
+            else:
+                total, away = score[i] - off_cost - leave_cost, far
+                x, y = x + points[bin_[i], 0], y + points[bin_[i], 1]
+            if total < best - beam:
+                continue
+            best = max(best, total)
+            at, worst = -1, -1
+            for other in range(on_network, size):
+                j = -1 - bin_[other]
+                if abs(off_x[j] - x) + abs(off_y[j] - y) < _SAME_PLACE_M and abs(wrap(offset[other] - offset[i])) < 0.3:
+                    at = other
+                if worst < 0 or score[other] < score[worst]:
+                    worst = other
+            if at < 0 and size - on_network == _MOST_OFF:
+                at = worst
+            if at < 0:
+                at = size
+                bin_[at] = -1 - off_size
+                size += 1
+                off_size += 1
+            elif total <= score[at]:
+                continue
+            j = -1 - bin_[at]
+            off_x[j], off_y[j], off_away[j] = x, y, away
+            k[at], parent[at], score[at], offset[at], rest[at] = k[i], i, total, offset[i], 0.0
+        bar = best - beam
         if size - end > most:
             bar = max(bar, np.partition(score[end:size], size - end - most)[size - end - most])
         for i in range(end, size):
-            slot[int(bin_[i]) * scale_count + int(k[i])] = -1
+            if bin_[i] >= 0:
+                slot[int(bin_[i]) * scale_count + int(k[i])] = -1
             if score[i] >= bar:
                 bin_[kept], k[kept], parent[kept], score[kept] = bin_[i], k[i], parent[i], score[i]
                 offset[kept], rest[kept] = offset[i], rest[i]
@@ -132,30 +292,51 @@ def forward(headings, step, scales, tables, costs, beam, most, enough, seeds):  
             break
     row_start = row_start[: times + 1]
     size = row_start[times]
-    return row_start, bin_[:size], k[:size], parent[:size], score[:size], offset[:size], rest[:size]
+    places = np.stack((off_x[:off_size], off_y[:off_size]), axis=1)
+    return row_start, bin_[:size], k[:size], parent[:size], score[:size], offset[:size], rest[:size], places, off_away[:off_size]
 
 
 @njit(cache=True)
-def backward(headings, step, scales, tables, costs, margin, survivors):  # type: ignore[no-untyped-def]
+def backward(
+    headings: NDArray[Any],
+    step: float,
+    scales: NDArray[Any],
+    tables: Tables,
+    costs: Costs,
+    off: OffNetwork,
+    margin: float,
+    survivors: Survivors,
+) -> NDArray[Any]:
     """Score (rows,) of the best complete route through each survivor; far below any score where none comes within ``margin``."""
-    row_start, bin_, k, _, score, offset, rest = survivors
+    row_start, bin_, k, parent, score, offset, rest, places, off_away = survivors
     times, scale_count = row_start.shape[0] - 1, scales.shape[0]
     through = np.full(bin_.shape[0], _NOWHERE, np.float32)
     through[row_start[times - 1] :] = score[row_start[times - 1] :]
     best = through[row_start[times - 1] :].max()
     slot = np.full((tables[0].shape[0] - 1) * scale_count, -1, np.int32)
-    out = np.empty((512, 5))
+    out = np.empty((_MOST_SUCCESSORS, 5))
     for t in range(times - 2, -1, -1):
         begin, end = row_start[t + 1], row_start[t + 2]
+        course = 0.5 * (headings[t] + headings[t + 1])
         for i in range(begin, end):
-            if through[i] >= best - margin:
+            if through[i] < best - margin:
+                continue
+            if bin_[i] >= 0:
                 slot[int(bin_[i]) * scale_count + int(k[i])] = i
+            else:
+                through[parent[i]] = max(through[parent[i]], through[i])
         for i in range(row_start[t], begin):
-            found = expand(bin_[i], int(k[i]), offset[i], rest[i], headings[t + 1], step, scales, tables, costs, out)
+            if bin_[i] >= 0:
+                found = expand(bin_[i], int(k[i]), offset[i], rest[i], headings[t + 1], step, scales, tables, costs, out)
+            else:
+                j, far = -1 - bin_[i], step * scales[k[i]]
+                x, y = places[j, 0] + far * math.cos(course + offset[i]), places[j, 1] + far * math.sin(course + offset[i])
+                found = expand_off(x, y, off_away[j] + far, int(k[i]), offset[i], headings[t + 1], tables, costs, off, out)
             for c in range(found):
                 at = slot[int(out[c, 0]) * scale_count + int(out[c, 1])]
                 if at >= 0:
                     through[i] = max(through[i], score[i] + out[c, 2] + (through[at] - score[at]))
         for i in range(begin, end):
-            slot[int(bin_[i]) * scale_count + int(k[i])] = -1
+            if bin_[i] >= 0:
+                slot[int(bin_[i]) * scale_count + int(k[i])] = -1
     return through

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,19 @@ SPACING_M = 0.5  # of the line's samples: a polyline's chord over 0.5 m is withi
 _CHORD_SAMPLES = 3  # heading over +-1.5 m, as in the lane graph
 _BACK_M = 1.5  # states may step back by rounding; farther back on the same lane means that a loop was driven
 
-Leg: TypeAlias = tuple[int, float, float]  # lane, from, to (m)
+
+class Leg(NamedTuple):
+    """A stretch of one lane, or (lane -1) a straight step off the network."""
+
+    lane: int
+    begin_m: float
+    end_m: float
+    begin_point_m: FloatArray  # (2,) used off the network only
+    end_point_m: FloatArray
+
+    @property
+    def length_m(self) -> float:
+        return max(self.end_m - self.begin_m, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,36 +38,47 @@ class RouteLine:
     arc_m: FloatArray  # (P,) strictly increasing
     points_m: FloatArray  # (P, 2)
     heading_rad: FloatArray  # (P,)
-    lane: IntArray  # (P,)
-    position_m: FloatArray  # (P,) on the lane
+    lane: IntArray  # (P,) -1: off the network
+    position_m: FloatArray  # (P,) on the lane; 0 off the network
 
 
 def route_line(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArray]:
     """The line through all of a route's states, and the arc length (T,) of each state on it."""
     legs, state_arc = _legs(route, network)
-    lane, position, arc = _samples(legs)
-    poses = interpolate(road_geometry(network), lane, position)
-    return RouteLine(arc, poses[:, :2], _chord_headings(poses[:, :2]), lane, position), state_arc
+    lane, position, arc, points = _samples(legs)
+    on_lane = lane >= 0
+    points[on_lane] = interpolate(road_geometry(network), lane[on_lane], position[on_lane])[:, :2]
+    return RouteLine(arc, points, _chord_headings(points), lane, position), state_arc
 
 
 def _legs(route: Route, network: RoadNetwork) -> tuple[list[Leg], FloatArray]:
     """Stretches driven one after the other, and the arc length (T,) at each state."""
     lengths = network.lane_lengths_m()
-    lane, begin = int(route.lane[0]), float(route.position_m[0])
     legs: list[Leg] = []
     done, state_arc = 0.0, np.zeros(len(route.lane))
     for t in range(1, len(route.lane)):
-        target, position = int(route.lane[t]), float(route.position_m[t])
-        if target != lane or position < float(route.position_m[t - 1]) - _BACK_M:
-            ahead = route.track.step * float(np.exp(route.log_scale[t]))
-            at = float(route.position_m[t - 1])
-            for first, last, into, entry in _chain(network, lengths, (lane, at), (target, position), ahead):
-                legs.append((first, begin, last))
-                done += max(last - begin, 0.0)
-                lane, begin = into, entry
-        state_arc[t] = done + max(position - begin, 0.0)
-    legs.append((lane, begin, max(begin, float(route.position_m[-1]))))
-    return legs, np.maximum.accumulate(state_arc)
+        step = _step_legs(route, network, lengths, t)
+        done += sum(leg.length_m for leg in step)
+        legs.extend(step)
+        state_arc[t] = done
+    return legs, state_arc
+
+
+def _step_legs(route: Route, network: RoadNetwork, lengths_m: FloatArray, t: int) -> list[Leg]:
+    """What lies between the states ``t - 1`` and ``t``."""
+    here, there = int(route.lane[t - 1]), int(route.lane[t])
+    a, b = route.points_m[t - 1], route.points_m[t]
+    if here < 0 or there < 0:
+        return [Leg(-1, 0.0, float(np.hypot(*(b - a))), a, b)]
+    begin, end = float(route.position_m[t - 1]), float(route.position_m[t])
+    if here == there and end >= begin - _BACK_M:
+        return [Leg(here, begin, end, a, b)]
+    ahead = route.track.step * float(np.exp(route.log_scale[t]))
+    legs, lane = [], here
+    for left, at, into, entry in _chain(network, lengths_m, (here, begin), (there, end), ahead):
+        legs.append(Leg(left, begin, at, a, b))
+        lane, begin = into, entry
+    return [*legs, Leg(lane, begin, end, a, b)]
 
 
 def _chain(
@@ -81,19 +104,17 @@ def _chain(
     return best
 
 
-def _samples(legs: list[Leg]) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Lane, position on it and arc length of samples along the legs."""
-    lane, position, arc, done = [], [], [], 0.0
-    for on, begin, end in legs:
-        length = end - begin
-        if length <= 0.0:
-            continue
-        along = (np.arange(max(1, round(length / SPACING_M))) + 0.5) * (length / max(1, round(length / SPACING_M)))
-        lane.append(np.full(len(along), on, dtype=np.int32))
-        position.append(begin + along)
-        arc.append(done + along)
-        done += length
-    return np.concatenate(lane), np.concatenate(position), np.concatenate(arc)
+def _samples(legs: list[Leg]) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    """Lane, position on it, arc length, and (off the network) point of samples along the legs."""
+    lengths = np.array([leg.length_m for leg in legs])
+    counts = np.where(lengths > 0.0, np.maximum(1, np.round(lengths / SPACING_M)), 0).astype(np.int64)
+    leg = np.repeat(np.arange(len(legs)), counts)
+    share = (np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[leg]
+    along = share * lengths[leg]
+    lane = np.array([leg.lane for leg in legs], dtype=np.int32)[leg]
+    position = np.where(lane >= 0, np.array([leg.begin_m for leg in legs])[leg] + along, 0.0)
+    begins, ends = (np.array([getattr(leg, name) for leg in legs])[leg] for name in ("begin_point_m", "end_point_m"))
+    return lane, position, (np.cumsum(lengths) - lengths)[leg] + along, begins + share[:, None] * (ends - begins)
 
 
 def _chord_headings(points_m: FloatArray) -> FloatArray:

@@ -1,0 +1,122 @@
+"""Gauss-Newton rounds of the default refinement: project onto the route's line, solve, estimate the noise anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from hippodrome.core.chain_solver import ChainFactor, marginals, solve_coupled
+from hippodrome.core.matching.route_line import RouteLine
+from hippodrome.core.noise_estimation import Noise, per_freedom, reestimated
+from hippodrome.core.refinement_residuals import State, Targets, closures, moved, normal_equations, odometry, road
+from hippodrome.core.types import Edges, FloatArray, Visits
+
+
+@dataclass(frozen=True, slots=True)
+class SolverConfig:
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    along_sigma_m: tuple[float, ...] = (3.0, 6.0, 12.0, np.inf, np.inf, np.inf, np.inf, np.inf)  # per round: let go slowly
+    inner_iterations: int = 3
+    reprojection_m: float = 4.0  # arc length that a vertex may slide in one round
+    unvouched_weight: float = 1e-6  # of the road where nothing vouches for it: too little to pull, enough to be determined
+    wander_m: float = (
+        0.15  # least lateral wander of a driver inside the lane, which no network shows; passes into the along-track too
+    )
+    wander_rad: float = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    state: State
+    arc_m: FloatArray  # (S,) on the route line
+    noise: Noise
+    covariance: FloatArray  # (S, 4, 4) x, y, heading, log scale
+
+
+def optimise(
+    visits: Visits,
+    edges: Edges,
+    line: RouteLine,
+    arc_m: FloatArray,
+    log_scale: FloatArray,
+    vouched: FloatArray,
+    config: SolverConfig,
+) -> Solution:
+    """The most likely poses and scales of S visits that begin at ``arc_m`` (S,) of the line; ``vouched`` (S,) 1: on this road, 0: not known."""
+    points, heading = on_line(line, arc_m)
+    state = State(np.column_stack([points, heading]), log_scale, np.zeros(2))
+    noise = Noise()
+    on_road = np.maximum(vouched, config.unvouched_weight)
+    for along_sigma_m in config.along_sigma_m:
+        arc_m = reproject(line, state.poses[:, :2], arc_m, config.reprojection_m)
+        points, heading = on_line(line, arc_m)
+        targets = Targets(points, heading, on_road, along_sigma_m)
+        for _ in range(config.inner_iterations):
+            state, factor = gauss_newton_step(state, visits, edges, targets, noise)
+        noise = estimate_noise(state, visits, edges, targets, noise, factor)
+    return Solution(state, arc_m, noise, calibrated(marginals(factor)[0], noise, config))
+
+
+def calibrated(covariance: FloatArray, noise: Noise, config: SolverConfig) -> FloatArray:
+    """The formal covariance (S, 4, 4) plus the driver's wander, which is the same over many visits and so never averages out."""
+    wander = max(config.wander_m, noise.lateral_m)
+    return covariance + np.diag([wander**2, wander**2, config.wander_rad**2, 0.0])
+
+
+def gauss_newton_step(state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise) -> tuple[State, ChainFactor]:
+    tied = closures(state, edges, noise)
+    system = normal_equations(
+        state, odometry(state, visits, noise), road(state, targets, noise), tied, edges.source, edges.target
+    )
+    cross = np.einsum("nmi,nmj->nij", tied.here, tied.there)
+
+    def couple(x: FloatArray) -> FloatArray:
+        product = np.zeros_like(x)
+        np.add.at(product, edges.source, np.einsum("nij,nj->ni", cross, x[edges.target]))
+        np.add.at(product, edges.target, np.einsum("nij,ni->nj", cross, x[edges.source]))
+        return product
+
+    step, gyro_step, factor = solve_coupled(system, couple, 1e-4, 100)
+    return moved(state, step, gyro_step), factor
+
+
+def estimate_noise(state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise, factor: ChainFactor) -> Noise:
+    """Squared whitened residuals per degree of freedom left, by kind."""
+    own, next_ = marginals(factor)
+    steps, roads, tied = odometry(state, visits, noise), road(state, targets, noise), closures(state, edges, noise)
+    joint = np.block([[own[:-1], next_], [np.swapaxes(next_, 1, 2), own[1:]]])
+    both = np.concatenate([steps.here, steps.there], axis=2)
+    steps_used = np.einsum("nmi,nij,nmj->m", both, joint, both)
+    roads_used = np.einsum("nmi,nij,nmj->m", roads.here, own, roads.here)
+    plain_sq = np.sum(tied.residual**2, axis=1) / np.maximum(tied.weight[:, 0], 1e-12)
+    return reestimated(
+        noise,
+        per_freedom(steps.residual, steps.weight, steps_used),
+        per_freedom(roads.residual, roads.weight, roads_used),
+        float(np.median(plain_sq)) if len(plain_sq) else None,
+    )
+
+
+def reproject(line: RouteLine, points_m: FloatArray, arc_m: FloatArray, reach_m: float) -> FloatArray:
+    """Arc length (S,) of the nearest place on the line within ``reach_m`` of the present one."""
+    spacing = (line.arc_m[-1] - line.arc_m[0]) / max(len(line.arc_m) - 1, 1)
+    window = np.arange(-int(np.ceil(reach_m / spacing)), int(np.ceil(reach_m / spacing)) + 1)
+    middle = np.searchsorted(line.arc_m, arc_m)
+    index = np.clip(middle[:, None] + window, 0, len(line.arc_m) - 1)
+    gap = points_m[:, None] - line.points_m[index]
+    best = index[np.arange(len(index)), np.argmin(np.sum(gap**2, axis=2), axis=1)]
+    cos, sin = np.cos(line.heading_rad[best]), np.sin(line.heading_rad[best])
+    off = points_m - line.points_m[best]
+    ahead = np.clip(cos * off[:, 0] + sin * off[:, 1], -spacing, spacing)
+    return line.arc_m[best] + ahead
+
+
+def on_line(line: RouteLine, arc_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points (S, 2) and headings (S,) at arc lengths; beyond the line's ends it runs straight on."""
+    heading = np.interp(arc_m, line.arc_m, np.unwrap(line.heading_rad))
+    points = np.column_stack([np.interp(arc_m, line.arc_m, line.points_m[:, axis]) for axis in (0, 1)])
+    beyond = arc_m - np.clip(arc_m, line.arc_m[0], line.arc_m[-1])
+    return points + beyond[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), heading

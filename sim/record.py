@@ -102,6 +102,8 @@ def prepare(plan: RecordingPlan) -> list[int]:
     folder = plan.folder()
     if (folder / MANIFEST).exists():
         return []
+    for abandoned in folder.glob(".*.part"):
+        abandoned.unlink()
     if not (folder / "samples.npz").exists():
         _simulate(plan, folder)
     samples = read_samples(folder / "samples.npz")

@@ -116,7 +116,8 @@ def read_samples(path: Path) -> Samples:
     same = all(len(array) == count for name, array in arrays.items() if name != "lane_ids")
     if not same or count == 0 or count > MAX_STEPS or arrays["poses_m"].shape != (count, 3):
         raise RecordingError(f"{path}: its arrays do not fit together; delete the recording to make it anew")
-    return Samples(**{**arrays, "lane_ids": tuple(str(name) for name in arrays["lane_ids"])})
+    lane_ids = tuple(str(name) for name in arrays.pop("lane_ids"))
+    return Samples(**arrays, lane_ids=lane_ids)
 
 
 def read_arrays(path: Path, names: list[str]) -> dict[str, np.ndarray[Any, np.dtype[Any]]]:

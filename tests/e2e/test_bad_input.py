@@ -1,6 +1,7 @@
 """Bad input: one clear line, exit status 2, no traceback, nothing overwritten."""
 
 import pytest
+
 from hippodrome.eval.cli import BAD_INPUT, main
 
 SCENARIO = "name: tiny\ntown: {kind: grid, width_m: 150, height_m: 150, road_km: 0.8}\n"

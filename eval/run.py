@@ -1,0 +1,95 @@
+"""``hippodrome eval``: scenarios in, ``results.json``, tables and figures out. Three rounds over one pool of processes."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
+from hippodrome.eval.paper_rows import quoted_rows
+from hippodrome.eval.pool import Workers, worker_pool
+from hippodrome.eval.results import Results, ScenarioResult, write_results
+from hippodrome.eval.tables import print_table_one, table_one_markdown
+from hippodrome.eval.thresholds import failed_limits
+from hippodrome.proto.atomic import write_atomically
+from hippodrome.sim.record import ROLES, RecordingPlan, finish, prepare, render_chunk
+from hippodrome.sim.recording import CHUNK_FRAMES
+from hippodrome.sim.render.probe import require_gl
+from hippodrome.sim.scenario import Scenario, load_scenario
+
+RESULTS = "results.json"
+
+
+def evaluate(paths: Sequence[Path], network: Path | None, seed: int | None, workers: int, out: Path) -> bool:
+    """Evaluate scenarios into ``out``; whether all their thresholds hold. Raises HippodromeError on bad input."""
+    scenarios = load_scenarios(paths, network, seed)
+    require_gl()
+    plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
+    with worker_pool(workers) as pool:
+        make_recordings(plans, pool)
+        tasks = [EvaluationTask(scenario, out) for scenario in scenarios]
+        rows = pool.run("evaluate", evaluate_scenario, tasks)
+    results = Results(scenarios=tuple(rows))
+    write_results(out / RESULTS, results)
+    write_atomically(out / "table1.md", table_one_markdown(results, quoted_rows()).encode())
+    return _report(scenarios, results, out)
+
+
+def render(paths: Sequence[Path], network: Path | None, seed: int | None, workers: int, out: Path) -> None:
+    """Make the recordings of scenarios and print where they are."""
+    scenarios = load_scenarios(paths, network, seed)
+    require_gl()
+    plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
+    with worker_pool(workers) as pool:
+        make_recordings(plans, pool)
+    for plan in plans:
+        print(plan.folder())
+
+
+def load_scenarios(paths: Sequence[Path], network: Path | None, seed: int | None) -> list[Scenario]:
+    """All scenarios, each with a name of its own: results are filed under it."""
+    scenarios = [load_scenario(path, network, seed) for path in paths]
+    name, times = Counter(scenario.name for scenario in scenarios).most_common(1)[0]
+    if times > 1:
+        raise HippodromeError(f"{times} scenarios are named '{name}': results are filed by name, so give each its own")
+    return scenarios
+
+
+def make_recordings(plans: Sequence[RecordingPlan], pool: Workers) -> None:
+    """Simulate, then draw, whatever is not on disk yet."""
+    chunks = pool.run("simulate", prepare, plans)
+    pool.run("render", _render_chunk, [(plan, chunk) for plan, missing in zip(plans, chunks, strict=True) for chunk in missing],
+             weight=lambda _: CHUNK_FRAMES)  # fmt: skip
+    pool.run("seal", _finish, plans)
+
+
+def _render_chunk(task: tuple[RecordingPlan, int]) -> int:
+    return render_chunk(*task)
+
+
+def _finish(plan: RecordingPlan) -> None:
+    finish(plan)
+
+
+def _report(scenarios: Sequence[Scenario], results: Results, out: Path) -> bool:
+    """Say on the terminal what came out; whether all limits hold."""
+    print_table_one(results, quoted_rows(), Console())
+    failures = [
+        f"{result.name}: {limit}"
+        for scenario, result in zip(scenarios, results.scenarios, strict=True)
+        for limit in failed_limits(scenario.thresholds, result)
+    ]
+    for failure in failures:
+        print(f"threshold failed: {failure}", file=sys.stderr)
+    print(f"\nresults: {out / RESULTS}\ntables:  {out / 'table1.md'}\nfigures: {out}/<scenario>/*.png")
+    return not failures
+
+
+def result_of(results: Results, name: str) -> ScenarioResult:
+    """The result of the scenario ``name``."""
+    return next(result for result in results.scenarios if result.name == name)

@@ -20,10 +20,9 @@ TILE_M: Final = 80.0  # small enough to cull well, large enough that a frame nee
 def build_scene(town: Town, seed: int, conditions: Conditions) -> Scene:
     """The same town and seed give the same geometry under all conditions, and the same bytes under the same ones."""
     origin_m = np.round(0.5 * (town.network.points_m.min(axis=0) + town.network.points_m.max(axis=0)))
-    bold, fine = town_mesh(town, seed, origin_m)
     light = light_of(conditions)
     return Scene(
-        tiles=_tiles(bold, fine, conditions),
+        tiles=_tiles(*town_mesh(town, seed, origin_m), conditions),
         sky=sky_dome(conditions),
         origin_m=origin_m,
         haze_rgb=haze_rgb(conditions),

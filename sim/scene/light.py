@@ -13,6 +13,7 @@ from hippodrome.sim.scene.types import Light, Tile
 
 KOSCHMIEDER: Final = 3.912  # -ln(0.02): the visibility is where 2 % of the contrast is left
 CLEAR_VISIBILITY_M: Final = 3000.0  # a hazy fine day; it also hides that the drawn world ends at the far plane
+FOG_DEPTH_M: Final = 500.0  # fog lies a few hundred metres thick: a longer visibility lets the sky through
 DOME_RADIUS_M: Final = 100.0  # any value between the near and the far plane: the sky is drawn at infinite depth
 LAMP: Final = np.array([1.0, 0.78, 0.42])  # sRGB of a lit window
 
@@ -39,12 +40,13 @@ def light_of(conditions: Conditions) -> Light:
     direction: FloatArray = np.array(
         [np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)]
     )
+    grey = _greyness(conditions)
     low = np.exp(-np.sin(elevation) / 0.15)  # the low sun's light is reddened and dimmed on its long way through the air
     colour: FloatArray = np.array([1.0, 0.96 - 0.25 * low, 0.88 - 0.5 * low])
-    sun: FloatArray = 0.95 * (1.0 - 0.4 * low) * (1.0 - conditions.overcast) * (1.0 - 0.95 * conditions.dusk) * colour
+    sun: FloatArray = 0.95 * (1.0 - 0.4 * low) * (1.0 - grey) * (1.0 - 0.95 * conditions.dusk) * colour
     day = 1.0 - 0.72 * conditions.dusk
     clear, cloudy = np.array([0.34, 0.39, 0.47]), np.array([0.60, 0.61, 0.62])
-    sky = day * ((1.0 - conditions.overcast) * clear + conditions.overcast * cloudy)
+    sky = day * ((1.0 - grey) * clear + grey * cloudy)
     ground = 0.45 * sky + 0.12 * direction[2] * sun
     return Light(sun_direction=direction, sun=sun, sky=sky, ground=ground)
 
@@ -88,9 +90,19 @@ def haze_rgb(conditions: Conditions) -> UInt8Array:
     return to_levels(_horizon(conditions))
 
 
+def _veil(conditions: Conditions) -> float:
+    """Share of the sky that fog hides: thick fog all of it, a distant haze nothing."""
+    return 0.0 if conditions.fog_visibility_m is None else float(np.exp(-conditions.fog_visibility_m / FOG_DEPTH_M))
+
+
+def _greyness(conditions: Conditions) -> float:
+    """How far clouds or fog scatter the sunlight."""
+    return max(conditions.overcast, _veil(conditions))
+
+
 def _horizon(conditions: Conditions) -> FloatArray:
     clear, cloudy, dusk = np.array([0.80, 0.87, 0.93]), np.array([0.80, 0.81, 0.82]), np.array([0.50, 0.42, 0.45])
-    grey = 1.0 if conditions.fog_visibility_m is not None else conditions.overcast
+    grey = _greyness(conditions)
     day = (1.0 - grey) * clear + grey * cloudy
     horizon: FloatArray = (1.0 - conditions.dusk) * day + conditions.dusk * dusk * day / clear
     return horizon
@@ -115,12 +127,13 @@ def sky_dome(conditions: Conditions) -> Tile:
 def _sky(ray: FloatArray, conditions: Conditions) -> FloatArray:
     """sRGB seen along unit rays (n, 3)."""
     horizon = _horizon(conditions)
-    zenith = (1.0 - conditions.overcast) * np.array([0.30, 0.52, 0.82]) + conditions.overcast * np.array([0.66, 0.68, 0.70])
+    grey = _greyness(conditions)
+    zenith = (1.0 - grey) * np.array([0.30, 0.52, 0.82]) + grey * np.array([0.66, 0.68, 0.70])
     zenith = (1.0 - conditions.dusk) * zenith + conditions.dusk * np.array([0.13, 0.16, 0.30])
     if conditions.fog_visibility_m is not None:
-        veil = np.exp(-conditions.fog_visibility_m / 1000.0)  # thick fog hides the blue, a distant haze does not
+        veil = _veil(conditions)
         zenith = (1.0 - veil) * zenith + veil * horizon
     height = (np.clip(ray[:, 2:], 0.0, 1.0)) ** 0.6
-    glow = np.clip(ray @ light_of(conditions).sun_direction, 0.0, 1.0)[:, None] ** 12 * (1.0 - conditions.overcast)
+    glow = np.clip(ray @ light_of(conditions).sun_direction, 0.0, 1.0)[:, None] ** 12 * (1.0 - grey)
     srgb: FloatArray = (1.0 - height) * horizon + height * zenith + 0.25 * glow * np.array([1.0, 0.9, 0.7])
     return np.clip(srgb, 0.0, 1.0)

@@ -22,6 +22,7 @@ REPAIRED_SHARE: Final = 0.12  # of the lanes' length: an ordinary road has been 
 PAINT_Z_M: Final = 0.05
 DASH_PERIOD_M: Final = 9.0  # a dash of one piece and a gap of two
 PAVED_SHARE: Final = 0.5
+MOUTH_M: Final = 3.0  # beyond a lane's border the land must reach this far to be land and not the notch of a junction's outline
 PAVEMENT_M: Final = 1.6
 LINE_M: Final = 0.14  # width of a painted line
 KERB_M: Final = (0.16, 0.12)  # width, height
@@ -62,8 +63,8 @@ def road_mesh(
 
 def _leads_into(pieces: Pieces, side: int, junctions: Shapes) -> Bools:
     """Whether a junction's area goes on beyond the border: then the border is no edge of the road."""
-    probe = pieces.middle_m() + side * pieces.left_normal() * (pieces.half_width_m + PROBE_M)[:, None]
-    return ~clear_of(shapely.points(probe), junctions, 0.0)
+    reach = [pieces.middle_m() + side * pieces.left_normal() * (pieces.half_width_m + r)[:, None] for r in (PROBE_M, MOUTH_M)]
+    return ~clear_of(shapely.linestrings(np.stack(reach, axis=1)), junctions, 0.0)
 
 
 def _has_room(pieces: Pieces, side: int, roads: Shapes) -> Bools:

@@ -7,7 +7,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from hippodrome.core.matching.paper import MatchedPath
-from hippodrome.core.refine_paper import PaperRefineConfig, metric_edges, optimise, refine_paper, trusted_edges
+from hippodrome.core.refine_paper import PaperRefineConfig, metric_edges, optimise, refine_paper, trusted_edges, without_closures
 from hippodrome.core.types import EdgeKind, MatchStatus, StartPose
 from tests.core.synthetic import grid_network, semi_metric_drive
 
@@ -113,13 +113,33 @@ def test_the_optimum_of_a_matched_map_is_a_fixed_point():
     poses, config = drive.cognitive_map.poses, PaperRefineConfig()
     edges = trusted_edges(drive.cognitive_map, config)
     matched = _matched_at(poses)
-    assert optimise(poses, edges, matched, config) == pytest.approx(poses, abs=1e-6)
+    found, cost = optimise(poses, edges, matched, config)
+    assert found == pytest.approx(poses, abs=1e-6)
+    assert cost == pytest.approx(0.0, abs=1e-9)
 
 
 def _matched_at(poses):
     count = len(poses)
     lane, status = np.zeros(count, dtype=np.int32), np.zeros(count, dtype=np.uint8)
     return MatchedPath(lane, np.zeros(count), poses[:, :2], status, (), 1.0, 1.0)
+
+
+def test_a_map_without_closures_is_bent_on_to_the_roads():
+    """0.6 rad of heading drift: no similarity fits, so the drive is grown from its beginning."""
+    network, drive = drive_of(3, closures=0, relaxed=False)
+    start = StartPose(*drive.true_poses[0])
+    refinement = refine_paper(drive.cognitive_map, network, start, PaperRefineConfig())
+    rigid = refine_paper(drive.cognitive_map, network, start, PaperRefineConfig(bent_cost=np.inf))
+    assert refinement.estimates["grown"] == 1.0
+    assert error_m(refinement, drive).mean() < 5.0 < error_m(rigid, drive).mean()
+
+
+def test_dead_reckoning_undoes_what_closures_did():
+    _, drive = drive_of(5, length_m=1500.0)
+    _, raw = drive_of(5, length_m=1500.0, relaxed=False)
+    reckoned = without_closures(drive.cognitive_map)
+    assert reckoned.poses == pytest.approx(raw.cognitive_map.poses, abs=1e-9)
+    assert set(reckoned.edges.kind.tolist()) == {int(EdgeKind.ODOMETRY)}
 
 
 def test_an_unknown_setting_is_rejected():

@@ -38,16 +38,5 @@ def unpack(data: bytes, dtype: str, shape: tuple[int, ...], name: str) -> Array:
     return little.astype(np.dtype(dtype), copy=False).reshape(shape)
 
 
-def row_differences(rows: Array) -> Array:
-    """Each row of bytes (N, D) minus the one before it, modulo 256: views that follow each other look alike."""
-    unsigned = rows.view(np.uint8)
-    return np.concatenate([unsigned[:1], unsigned[1:] - unsigned[:-1]]).view(rows.dtype)
-
-
-def row_sums(differences: Array) -> Array:
-    """The inverse of ``row_differences``."""
-    return np.cumsum(differences.view(np.uint8), axis=0, dtype=np.uint8).view(differences.dtype)
-
-
 def _transposed(planes: Array) -> Array:
     return np.ascontiguousarray(planes.T)

@@ -18,7 +18,7 @@ from hippodrome.core.types import (
     Visits,
 )
 from hippodrome.proto import cognitive_map_pb2 as wire
-from hippodrome.proto.arrays import FieldError, pack, row_differences, row_sums, unpack
+from hippodrome.proto.arrays import FieldError, pack, unpack
 from hippodrome.proto.checks import MAX_DESCRIPTOR_DIMENSIONS, check_map
 from hippodrome.proto.layout import ATTRACTORS, EDGES, REFINED_VERTICES, ROAD_MATCH, TEMPLATE_TYPES, VERTICES, VISITS, Layout
 from hippodrome.proto.migrate import migrate
@@ -127,9 +127,6 @@ def _encode_header(cognitive_map: CognitiveMap, provenance: Mapping[str, str]) -
 
 def _encode_view_cells(cells: ViewCells, header: wire.Header) -> wire.ViewCells:
     templates = pack(cells.templates, TEMPLATE_TYPES[cells.kind], (header.view_cells, header.descriptor_size), "templates")
-    if cells.templates.size:
-        differences = row_differences(cells.templates)
-        templates = pack(differences, TEMPLATE_TYPES[cells.kind], differences.shape, "templates")
     mean = pack(cells.mean, "float32", (header.descriptor_size,), "mean")
     return wire.ViewCells(kind=_KINDS[cells.kind], templates=templates, mean=mean, shape=cells.shape)
 
@@ -141,7 +138,7 @@ def _decode_view_cells(message: wire.ViewCells, header: wire.Header) -> ViewCell
         raise FieldError(f"descriptor shape has {len(message.shape)} dimensions, the limit is {MAX_DESCRIPTOR_DIMENSIONS}")
     return ViewCells(
         kind=kind,
-        templates=row_sums(unpack(message.templates, TEMPLATE_TYPES[kind], shape, "templates")),
+        templates=unpack(message.templates, TEMPLATE_TYPES[kind], shape, "templates"),
         mean=unpack(message.mean, "float32", (header.descriptor_size,), "mean"),
         shape=tuple(message.shape),
     )

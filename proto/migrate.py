@@ -1,7 +1,7 @@
 """Older format versions brought up to date, one step at a time, as messages.
 
-Version 1 wrote arrays as they lie in memory (little-endian, not byte-transposed), templates without row differences, and
-no counts in the header: a reader had to infer them. Version 2 is what ``cognitive_map.proto`` describes.
+Version 1 wrote arrays as they lie in memory (little-endian, not byte-transposed), and no counts in the header: a
+reader had to infer them. Version 2 is what ``cognitive_map.proto`` describes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from google.protobuf.message import Message
 
 from hippodrome.proto import cognitive_map_pb2 as wire
-from hippodrome.proto.arrays import FieldError, pack, row_differences
+from hippodrome.proto.arrays import FieldError, pack
 from hippodrome.proto.layout import ATTRACTORS, EDGES, REFINED_VERTICES, ROAD_MATCH, VERTICES, VISITS, Layout
 
 
@@ -41,22 +41,13 @@ def _from_1_to_2(messages: Sequence[Any]) -> list[Message]:
     )
     return [
         counted,
-        _view_cells_from_1(view_cells, counted.descriptor_size),
+        _transposed(view_cells, (("mean", "float32", ()),)),  # templates are single bytes: nothing to transpose
         _transposed(attractors, ATTRACTORS),
         _transposed(vertices, VERTICES + REFINED_VERTICES),
         _transposed(edges, EDGES),
         _transposed(visits, VISITS),
         *(_transposed(match, ROAD_MATCH) for match in road_match),
     ]
-
-
-def _view_cells_from_1(message: wire.ViewCells, descriptor_size: int) -> wire.ViewCells:
-    rows = _flat(message.templates, "uint8", "templates")
-    if len(rows) % max(descriptor_size, 1):
-        raise FieldError(f"templates has {len(rows)} bytes, no multiple of the descriptor's {descriptor_size}")
-    upgraded: wire.ViewCells = _transposed(message, (("mean", "float32", ()),))
-    upgraded.templates = row_differences(rows.reshape(-1, max(descriptor_size, 1))).tobytes()
-    return upgraded
 
 
 def _transposed(message: Any, layout: Layout) -> Any:

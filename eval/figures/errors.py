@@ -16,16 +16,17 @@ VIOLIN_GRID = 200
 
 
 def draw_error_profiles(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, Score], title: str = "") -> None:
-    """APE above, RPE below, one line a method, over the time of the drive."""
+    """APE above, RPE below, one line a method over the time of the drive; earlier ones wider, so that none hides."""
     figure = new_figure(9.0, 5.6)
     panels = figure.subplots(2, 1, sharex=True)
     for axes, scores, name in zip(panels, (ape, rpe), ("APE", "RPE"), strict=True):
-        for (method, score), colour in zip(scores.items(), SERIES, strict=False):
-            label = f"{method}: mean {score.mean_m:.2f} m"
-            axes.plot(score.t_s, np.maximum(score.errors_m, FLOOR_M), color=colour, linewidth=0.9, label=label)
+        for place, ((method, score), colour) in enumerate(zip(scores.items(), SERIES, strict=False)):
+            look = {"color": colour, "linewidth": max(3.0 - place, 0.8), "label": f"{method}: mean {score.mean_m:.2f} m"}
+            axes.plot(score.t_s, np.maximum(score.errors_m, FLOOR_M), **look)
         tidy(axes, "", f"{name} (m)", title if name == "APE" else "")
         log_errors(axes, _together(scores))
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
+        if scores:
+            axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
     panels[1].set_xlabel("time (s)")
     save_figure(figure, path)
 
@@ -37,7 +38,7 @@ def draw_error_violins(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, S
     for axes, scores, name in zip(figure.subplots(1, 2), (ape, rpe), ("APE", "RPE"), strict=True):
         for place, (score, colour) in enumerate(zip(scores.values(), SERIES, strict=False)):
             _violin(axes, place, score.errors_m, colour)
-        tidy(axes, "", f"{name} (m)", title if name == "APE" else "")
+        tidy(axes, "", f"{name} (m)", title if name == "APE" else "box: quartiles, line: median, diamond and number: mean")
         axes.set_xticks(range(len(scores)), [method.replace(" ", "\n", 1) for method in scores], fontsize=8)
         axes.set_xlim(-0.6, len(scores) - 0.4)
         log_errors(axes, _together(scores))

@@ -80,8 +80,9 @@ def draw_localization_strip(
         picture.imshow(frame, cmap="gray")
         picture.set_title(f"{estimate.t_s - t_s[0]:.1f} s", fontsize=9, color=GREEN if estimate.localized else FAINT)
         sheet.imshow(grid_sheet(estimate, module).T, origin="lower", cmap="magma", vmin=0.0)
-        _ring(figure.add_subplot(grid[2, column], projection="polar"), estimate)
-        for axes, name in ((picture, "frame"), (sheet, f"grid cells,\nmodule {module + 1}")):
+        ring = figure.add_subplot(grid[2, column], projection="polar")
+        _ring(ring, estimate)
+        for axes, name in ((picture, "frame"), (sheet, f"grid cells,\nmodule {module + 1}"), (ring, "head\ndirection")):
             axes.set_xticks([])
             axes.set_yticks([])
             if column == 0:
@@ -143,7 +144,8 @@ def _log_time_error(axes: Axes, shown: Sequence[LocalizationEstimate], t_s: Floa
 
 def _bands(axes: Axes, t_s: FloatArray, chosen: NDArray[np.bool_], colour: str, label: str) -> None:
     """Shade each run of chosen steps, from its first step to the step after its last."""
+    alpha = 0.5 if colour == VERMILION else 0.18
     changes = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
     for first, stop in changes.reshape(-1, 2):
-        axes.axvspan(t_s[first], t_s[min(stop, len(t_s) - 1)], color=colour, alpha=0.18, linewidth=0, label=label)
+        axes.axvspan(t_s[first], t_s[min(stop, len(t_s) - 1)], color=colour, alpha=alpha, linewidth=0, label=label)
         label = "_"  # one entry in the legend

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
+from matplotlib.ticker import LogLocator
 
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, EdgeKind, FloatArray
@@ -38,7 +39,7 @@ def draw_maps_over_truth(
     figure = new_figure(7.2, 6.4)
     axes = figure.subplots()
     draw_network(axes, network)
-    axes.plot(truth_m[:, 0], truth_m[:, 1], color=TRUTH, linewidth=1.2, label="ground truth", zorder=2)
+    axes.plot(truth_m[:, 0], truth_m[:, 1], color=TRUTH, linewidth=0.9, label="ground truth", zorder=4)
     for (name, positions_m), colour in zip(maps_m.items(), SERIES, strict=False):
         axes.plot(positions_m[:, 0], positions_m[:, 1], ".", color=colour, markersize=3.5, alpha=0.8, label=name, zorder=3)
     axes.autoscale_view()
@@ -77,24 +78,35 @@ def draw_error_map(
     figure = new_figure(7.6, 6.4)
     axes = figure.subplots()
     draw_network(axes, network)
-    top = max(float(np.percentile(errors_m, CLIP_PERCENTILE)), 10.0 * FLOOR_M) if len(errors_m) else 1.0
+    low_m, high_m = _colour_range(errors_m)
     order = np.argsort(errors_m, kind="stable")  # the worst on top
     dots = axes.scatter(
         positions_m[order, 0],
         positions_m[order, 1],
-        c=np.maximum(errors_m[order], FLOOR_M),
-        norm=LogNorm(FLOOR_M, top),
+        c=np.maximum(errors_m[order], low_m),
+        norm=LogNorm(low_m, high_m),
         cmap=ERROR_MAP,
         s=12,
         linewidths=0,
         zorder=3,
     )
-    bar = figure.colorbar(dots, ax=axes, label=label, shrink=0.8, extend="max", format=lambda value, _: f"{value:g}")
+    ticks = LogLocator(subs=(1.0, 2.0, 5.0))
+    bar = figure.colorbar(dots, ax=axes, label=label, shrink=0.8, extend="both", ticks=ticks)
+    bar.ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    bar.minorticks_off()
     bar.outline.set_visible(False)
     axes.set_title(title, loc="left", fontsize=10)
     save_figure(figure, path)
 
 
+def _colour_range(errors_m: FloatArray) -> tuple[float, float]:
+    """From the few smallest to the few largest errors, at least half a decade apart."""
+    if len(errors_m) == 0:
+        return FLOOR_M, 1.0
+    low_m = max(float(np.percentile(errors_m, 100.0 - CLIP_PERCENTILE)), FLOOR_M)
+    return low_m, max(float(np.percentile(errors_m, CLIP_PERCENTILE)), 3.0 * low_m)
+
+
 def _legend_below(figure: Any, axes: Axes) -> None:
     """A legend outside the map, where it hides no road."""
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, markerscale=2.0)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)

@@ -21,7 +21,7 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
 )  # fmt: skip
 TRUTH, ROAD, FAINT = "#222222", "#c8c8c8", "#777777"
 SERIES: Final = (VERMILION, BLUE, GREEN, PURPLE, ORANGE, SKY, BLACK)  # in the order in which methods are given
-ERROR_MAP: Final = "viridis"
+ERROR_MAP: Final = "viridis_r"  # large errors dark: on white they must not fade
 DPI = 130
 FLOOR_M = 0.01  # logarithmic error axes begin at a centimetre
 

@@ -18,7 +18,7 @@ PROVENANCE = {"seed": "1", "writer": "version 1"}
 
 
 def write_v1(path, m, provenance):
-    """Format version 1: arrays as they lie in memory, no counts in the header, no template differences."""
+    """Format version 1: arrays as they lie in memory, no counts in the header."""
     write_stream(path, 1, [message.SerializeToString(deterministic=True) for message in v1_messages(m, provenance)])
 
 

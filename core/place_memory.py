@@ -27,14 +27,17 @@ class PlaceMemoryConfig:
 
     view_cells: ViewCellConfig = field(default_factory=ViewCellConfig)
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
-    closure_margin: float = 2.2  # filtered; a wrong closure feeds the cells that later views are compared with
+    start_margin: float = 4.0  # filtered, on meeting an old road: bends look alike, and a wrong closure breeds more of them
+    closure_margin: float = 2.0  # filtered, once on it
     waiting_views: int = 16  # before a view is stored: the loop around the smallest block is longer
     support_z: float = 3.0  # what the view itself must say: the filter runs on past a junction, and back before one
     column_rad: float = 0.1  # heading per column of shift, between the mean (fov / columns) and the centre of a 90 deg image
 
     def __post_init__(self) -> None:
-        if self.closure_margin <= 0.0 or self.waiting_views < 1 or self.column_rad <= 0.0:
-            raise ValueError("place memory: closure_margin, waiting_views and column_rad must be positive")
+        if not 0.0 < self.closure_margin <= self.start_margin:
+            raise ValueError("place memory: 0 < closure_margin <= start_margin is required")
+        if self.waiting_views < 1 or self.column_rad <= 0.0:
+            raise ValueError("place memory: waiting_views and column_rad must be positive")
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +96,7 @@ class PlaceMemory:
         evidence = filter_step(before, z, self._graph.links, travelled, turned_rad, spacing, sequence)
         self._waiting.append(_Waiting(vertex, descriptor, travelled, turned_rad, scores, evidence))
         best = peak(evidence, self._graph.links, sequence.neighbourhood * spacing)
-        found = self._trace(best) if best.margin >= self._config.closure_margin else []
+        found = self._trace(best) if best.margin >= self._needed_margin(best) else []
         if len(self._waiting) > self._config.waiting_views:
             self._store(spacing)
         return found
@@ -104,6 +107,13 @@ class PlaceMemory:
             self._store(spacing)
         config, templates = self._config.view_cells, self._views.bank.templates
         return ViewCells(config.kind, templates.copy(), view_cells.template_mean(config.kind, templates), config.shape)
+
+    def _needed_margin(self, best: Peak) -> float:
+        """Less on a road that the views before have recognised, where the path leads from their cell to this one."""
+        latest = self._waiting[-1]
+        came_from = latest.evidence.predecessor[best.cell] if best.cell >= 0 else -1
+        continues = came_from >= 0 and len(self._waiting) > 1 and self._waiting[-2].cell == came_from
+        return self._config.closure_margin if continues else self._config.start_margin
 
     def _trace(self, best: Peak) -> list[Recognition]:
         """The latest view's recognition, and those of waiting views on the path that led to it."""

@@ -20,7 +20,7 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.proto.atomic import write_atomically
 
 MAGIC = b"\x89HIPPO\r\n"  # high bit and line end, as in PNG: a transfer in text mode breaks it visibly
-COMPRESSION_LEVEL = 9  # fixed: the same map gives the same bytes; a map is written once and read often
+COMPRESSION_LEVEL = 6  # fixed: the same map gives the same bytes; 9 saves little and takes several times as long
 MAX_FILE_BYTES = 512 << 20  # a map of 100,000 vertices takes about 120 MB
 MAX_RAW_BYTES = 512 << 20  # all records together, decompressed
 MAX_RECORDS = 64

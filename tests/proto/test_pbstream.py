@@ -30,7 +30,7 @@ def read(tmp_path, data):
 
 def test_layout_is_as_documented(tmp_path):
     write_stream(tmp_path / "file", 1, [b"one", b"", b"three"])
-    records = [(len(raw), zlib.compress(raw, 9)) for raw in (b"one", b"", b"three")]
+    records = [(len(raw), zlib.compress(raw, pbstream.COMPRESSION_LEVEL)) for raw in (b"one", b"", b"three")]
     assert (tmp_path / "file").read_bytes() == framed(*records)
     assert read_stream(tmp_path / "file", 1) == (1, [b"one", b"", b"three"])
 

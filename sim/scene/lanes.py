@@ -99,10 +99,10 @@ def _mitred_normals(points: FloatArray, owner: IntArray) -> FloatArray:
     return normals
 
 
-def beside(pieces: Pieces, is_internal: np.ndarray, side: int) -> tuple[UInt8Array, IntArray]:
-    """What lies beyond the left (+1) or right (-1) border of each piece, and the lane there (-1: none)."""
+def beside(pieces: Pieces, is_internal: np.ndarray, side: int, probe_m: float = PROBE_M) -> tuple[UInt8Array, IntArray]:
+    """What lies ``probe_m`` beyond the left (+1) or right (-1) border of each piece, and the lane there (-1: none)."""
     tree = KDTree(pieces.middle_m())
-    probe = pieces.middle_m() + side * pieces.left_normal() * (pieces.half_width_m + PROBE_M)[:, None]
+    probe = pieces.middle_m() + side * pieces.left_normal() * (pieces.half_width_m + probe_m)[:, None]
     neighbours = min(16, len(probe))
     near = tree.query(probe, k=neighbours, distance_upper_bound=6.0)[1].reshape(len(probe), neighbours)
     found = near < len(probe)

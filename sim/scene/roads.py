@@ -51,7 +51,8 @@ def road_mesh(
     open_road = ~network.is_internal[pieces.lane]
     for side in (1, -1):
         kind, other = beside(pieces, network.is_internal, side)
-        edge = pieces.select((kind == Beside.NOTHING) & (open_road | ~_leads_into(pieces, side, junctions)))
+        turn = beside(pieces, network.is_internal, side, probe_m=0.05)[0] == Beside.NOTHING  # not between two lanes that part
+        edge = pieces.select((kind == Beside.NOTHING) & (open_road | (turn & ~_leads_into(pieces, side, junctions))))
         paved = (town_share(edge.middle_m()) > PAVED_SHARE) & _has_room(edge, side, roads)
         bold += [_verge(edge.select(~paved), side), _pavement(edge.select(paved), side)]
         fine.append(_line(edge, side, inset_m=0.2))

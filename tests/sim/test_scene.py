@@ -262,3 +262,10 @@ def test_a_town_far_from_its_networks_zero_looks_the_same():
     assert np.allclose(two.origin_m - one.origin_m, shift)
     assert len(one.tiles) == len(two.tiles)
     assert np.allclose(one.tiles[5].vertices_m, two.tiles[5].vertices_m, atol=1e-3)
+
+
+def test_edge_lines_do_not_cross_a_junctions_middle():
+    mesh = merge(town_mesh(crossing(), 0, ORIGIN))
+    paint = mesh.vertices_m[mesh.faces].astype(np.float64)
+    paint = paint[np.all(paint[:, :, 2] == np.float32(0.05), axis=1)][:, :, :2].mean(axis=1)
+    assert not np.any(np.all(np.abs(paint) < 6.0, axis=1))

@@ -110,7 +110,7 @@ def toured_area(graph: TourGraph, length_m: float) -> IntArray:
     round_trip[middle] = 0.0
     order = np.argsort(round_trip, kind="stable")
     enough = int(np.searchsorted(np.cumsum((graph.length_m + graph.junction_m)[order]), length_m))
-    reach = round_trip[order[min(enough, len(order) - 1)]]
+    reach = round_trip[order[min(max(enough, 1), len(order) - 1)]]  # one edge alone is no round trip
     return np.flatnonzero(round_trip <= reach + 1e-6).astype(np.int32)
 
 

@@ -92,8 +92,8 @@ def test_another_town_is_never_taken_for_this_one():
 
 
 def test_leaving_the_mapped_road_is_reported_once_dead_reckoning_is_spent():
-    half = topometric_map(PICTURES, np.random.default_rng(3), span_m=0.5 * loop_length())
-    _, _, localized, error_m = run(cognitive_map=half, length_m=720.0)
+    part = topometric_map(PICTURES, np.random.default_rng(3), span_m=0.35 * loop_length())
+    _, _, localized, error_m = run(cognitive_map=part, length_m=720.0)
     assert localized[:200].mean() > 0.9
     assert not np.any(localized & (error_m > 20.0))
     assert not localized[int((0.95 * loop_length() - 137.0) / 0.8)]

@@ -19,9 +19,9 @@ CHANGE_S: Final = 3.5  # duration of a lane change: 5.8 * 3.2 m / (3.5 s)^2 = 1.
 MIN_CHANGE_M: Final = 12.0  # a slow car cannot change lanes on the spot
 MAX_CURVATURE_1PM: Final = 0.32  # turning circle of a small car: 3.1 m at the rear axle, 10 m at the outer front corner
 MAX_CURVATURE_SLOPE_1PM2: Final = 0.25  # from straight on to full lock within 1.3 m: 0.6 s at walking pace
-FINE_ROUNDING_M: Final = 0.5  # takes the integration's grain out of the curvature
 RETURN_M: Final = 3.0  # distance over which a car that could not follow comes back to the lane
 LOOK_AHEAD_M: Final = 0.6  # steering begins before the bend, by half the way that it takes
+MIN_STRETCH: Final = 0.05  # where a smoothed hairpin nearly stands still
 FINE_STEP_M: Final = 0.05  # integration step of the turning circle
 
 
@@ -62,10 +62,10 @@ def smooth_path(network: RoadNetwork, pieces: Sequence[Piece], aside_m: FloatArr
     starts = piece_starts(pieces)
     points = _on_centrelines(network, pieces, starts)
     points = points + _lane_changes(points, pieces, starts)
-    points = _rounded(points, ROUNDING_M)
+    points = _rounded(points)
     if aside_m is not None:
         points = points + aside_m[:, None] * _left(points)
-    return _as_path(_rounded(_within_turning_circle(_as_path(points)), FINE_ROUNDING_M))
+    return _within_turning_circle(_as_path(points))
 
 
 def sample_count(pieces: Sequence[Piece]) -> int:
@@ -115,16 +115,16 @@ def _left_beside_jumps(points_m: FloatArray, jumps: list[int]) -> FloatArray:
     for after in jumps:
         steps[after - 1] = steps[after]
     straightened = np.concatenate([points_m[:1], points_m[0] + np.cumsum(steps, axis=0)])
-    return _left(_rounded(straightened, ROUNDING_M))
+    return _left(_rounded(straightened))
 
 
-def _rounded(points_m: FloatArray, deviation_m: float) -> FloatArray:
+def _rounded(points_m: FloatArray) -> FloatArray:
     """Gaussian smoothing along the path; beyond its ends the path is taken to go straight on."""
-    pad = min(len(points_m) - 1, int(4 * deviation_m / STEP_M))
+    pad = min(len(points_m) - 1, int(4 * ROUNDING_M / STEP_M))
     before = 2.0 * points_m[0] - points_m[pad:0:-1]
     after = 2.0 * points_m[-1] - points_m[-2 : -pad - 2 : -1]
     padded = np.concatenate([before, points_m, after])
-    smooth: FloatArray = gaussian_filter1d(padded, deviation_m / STEP_M, axis=0, mode="nearest")[pad : pad + len(points_m)]
+    smooth: FloatArray = gaussian_filter1d(padded, ROUNDING_M / STEP_M, axis=0, mode="nearest")[pad : pad + len(points_m)]
     return smooth
 
 
@@ -139,24 +139,24 @@ def _as_path(points_m: FloatArray) -> Path:
     """Derivatives by u turn into heading, curvature kappa = (x'y'' - y'x'') / |p'|^3 and stretch |p'|."""
     first = np.gradient(points_m, STEP_M, axis=0)
     second = np.gradient(first, STEP_M, axis=0)
-    stretch = np.maximum(np.linalg.norm(first, axis=1), 0.05)
+    stretch = np.maximum(np.linalg.norm(first, axis=1), MIN_STRETCH)
     curvature = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / stretch**3
     return Path(points_m, np.unwrap(np.arctan2(first[:, 1], first[:, 0])), curvature, stretch)
 
 
-def _within_turning_circle(path: Path) -> FloatArray:
-    """Points (n, 2) beside each sample of where a car goes that cannot turn tighter than ``MAX_CURVATURE_1PM``."""
+def _within_turning_circle(path: Path) -> Path:
+    """Where a car goes that follows the path but cannot turn tighter than ``MAX_CURVATURE_1PM``."""
     x, y = np.ascontiguousarray(path.points_m[:, 0]), np.ascontiguousarray(path.points_m[:, 1])
     driven: FloatArray = _steer_along(x, y, path.heading_rad, path.curvature_1pm, path.stretch)
-    return driven
+    stretch = np.maximum(np.linalg.norm(np.gradient(driven[:, :2], STEP_M, axis=0), axis=1), MIN_STRETCH)
+    return Path(driven[:, :2], driven[:, 2], driven[:, 3], stretch)
 
 
 @njit(cache=True)
 def _steer_along(x: FloatArray, y: FloatArray, heading: FloatArray, curvature: FloatArray, stretch: FloatArray) -> FloatArray:
     """kappa = kappa_path - e / l^2 - 2 psi / l (Samson, 1993, linearised), integrated over distance within the car's limits."""
     n = len(x)
-    driven = np.empty((n, 2))
-    driven[:, 0], driven[:, 1] = x, y
+    driven = np.stack((x, y, heading, curvature), axis=1)  # row: x, y, heading, curvature beside each sample of the path
     px, py, psi, kappa, u, filled = x[0], y[0], heading[0], 0.0, 0.0, 1
     for _ in range(int(20 * n * STEP_M / FINE_STEP_M)):
         k = min(int(u / STEP_M), n - 2)
@@ -169,15 +169,14 @@ def _steer_along(x: FloatArray, y: FloatArray, heading: FloatArray, curvature: F
         wanted = min(max(wanted, -MAX_CURVATURE_1PM), MAX_CURVATURE_1PM)
         most = MAX_CURVATURE_SLOPE_1PM2 * FINE_STEP_M
         kappa += min(max(wanted - kappa, -most), most)
-        before_x, before_y, before_u = px, py, u
+        before, before_u = np.array((px, py, psi, kappa)), u
         px, py = px + FINE_STEP_M * np.cos(psi), py + FINE_STEP_M * np.sin(psi)
         psi += FINE_STEP_M * kappa
         dx, dy = px - (x[k] + share * (x[k + 1] - x[k])), py - (y[k] + share * (y[k + 1] - y[k]))
         u += max((np.cos(ref) * dx + np.sin(ref) * dy) / stretch[k], 0.0)
         while filled < n and filled * STEP_M <= u:
             part = (filled * STEP_M - before_u) / (u - before_u)
-            driven[filled, 0] = before_x + part * (px - before_x)
-            driven[filled, 1] = before_y + part * (py - before_y)
+            driven[filled] = before + part * (np.array((px, py, psi, kappa)) - before)
             filled += 1
         if filled == n:
             break

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.se2 import wrap
-from hippodrome.sim.ego import LIMIT_LATERAL_MPS2, EgoCar, EgoSpec, comfortable_speed_mps, follow, wander_m
+from hippodrome.sim.ego import LIMIT_LATERAL_MPS2, MAX_STEERING_RAD, EgoCar, EgoSpec, comfortable_speed_mps, follow, wander_m
 from hippodrome.sim.path import MAX_CURVATURE_1PM, STEP_M, Path, Piece, sample_count, smooth_path
 
 
@@ -74,12 +74,12 @@ def test_comfortable_speed_by_hand():
 
 
 @settings(max_examples=12, deadline=None)
-@given(turn_deg=st.floats(-170.0, 170.0), seed=st.integers(0, 99))
+@given(turn_deg=st.floats(-150.0, 150.0), seed=st.integers(0, 99))
 def test_car_keeps_its_turning_circle_and_limits_at_any_corner(turn_deg, seed):
     turn = np.deg2rad(turn_deg)
     end = np.array([60.0, 0.0]) + 60.0 * np.array([np.cos(turn), np.sin(turn)])
     path = path_of([[0.0, 0.0], [60.0, 0.0], end])
-    assert np.abs(path.curvature_1pm).max() < 1.6 * MAX_CURVATURE_1PM  # a corner itself has no bound at all
+    assert np.abs(path.curvature_1pm).max() <= MAX_CURVATURE_1PM + 1e-9
     limit = np.random.default_rng(seed).uniform(4.0, 14.0)
     cap = comfortable_speed_mps(path, np.full(len(path.stretch), limit), EgoSpec())
     u, speed = [2.0], limit
@@ -87,10 +87,12 @@ def test_car_keeps_its_turning_circle_and_limits_at_any_corner(turn_deg, seed):
         speed = min(cap[int(u[-1] / STEP_M)], speed + 0.05 * 1.8)
         u.append(u[-1] + 0.05 * speed)
     track = follow(path, np.array(u), 0.05)
-    yaw_rate = np.diff(track.poses_m[:, 2]) / 0.05
+    turned, moved = np.diff(track.poses_m[:, 2]), np.linalg.norm(np.diff(track.poses_m[:, :2], axis=0), axis=1)
+    assert np.abs(turned).max() <= (np.tan(MAX_STEERING_RAD) / 2.7) * moved[np.argmax(np.abs(turned))] * 1.05
+    yaw_rate = turned / 0.05
     assert np.abs(yaw_rate).max() < 0.9
     assert np.abs(yaw_rate * track.speed_mps[1:]).max() < LIMIT_LATERAL_MPS2 + 0.3
-    assert np.abs(track.u_m - u).max() < 1.0
+    assert np.abs(track.u_m - u).max() < 1.5  # 0.3 m on real junctions; a hairpin without width costs more
     assert wrap(track.poses_m[-1, 2] - path.heading_rad[-1]) == pytest.approx(0.0, abs=0.05)
 
 

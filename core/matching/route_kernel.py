@@ -115,10 +115,12 @@ def expand_off(
     count = 0
     column_0 = max(int((x - radius - origin_x) / cell_m), 0)
     column_1 = min(int((x + radius - origin_x) / cell_m), columns - 1)
-    for row in range(max(int((y - radius - origin_y) / cell_m), 0), min(int((y + radius - origin_y) / cell_m), rows - 1) + 1):
-        for c in range(
-            cell_start[row * columns + column_0], cell_start[row * columns + column_1 + 1] if column_1 >= column_0 else 0
-        ):
+    if column_0 > column_1:
+        return 0
+    row_0 = max(int((y - radius - origin_y) / cell_m), 0)
+    row_1 = min(int((y + radius - origin_y) / cell_m), rows - 1)
+    for row in range(row_0, row_1 + 1):
+        for c in range(cell_start[row * columns + column_0], cell_start[row * columns + column_1 + 1]):
             bin_ = cell_bin[c]
             gap_sq = (points[bin_, 0] - x) ** 2 + (points[bin_, 1] - y) ** 2
             turn = wrap(bin_heading[bin_] - heading - offset)
@@ -187,11 +189,11 @@ def forward(
 ) -> Survivors:
     """Beam search over T headings, of at most about ``most`` survivors a step. It ends early once no more than ``enough`` survive.
 
-    ``seeds``: bin, scale bin, score, offset, rest of the hypotheses at heading 0.
+    ``seeds``: bin, scale bin, score, offset, rest of the hypotheses at heading 0; place, metres of those off the network.
     Returns the survivors of the t <= T steps searched: row_start (t + 1,), bin, scale bin, parent (row), score, offset, rest,
     and of those off the network: place (M, 2), metres driven since they left.
     """
-    seed_bin, seed_k, seed_score, seed_offset, seed_rest = seeds
+    seed_bin, seed_k, seed_score, seed_offset, seed_rest, seed_place, seed_away = seeds
     times, scale_count, points, lane = headings.shape[0], scales.shape[0], off[0], tables[5]
     leave_cost, off_cost, off_spread = off[11], off[12], off[13]
     size = seed_bin.shape[0]
@@ -200,7 +202,10 @@ def forward(
     score, offset, rest = np.empty(room, np.float32), np.empty(room, np.float32), np.empty(room, np.float32)
     bin_[:size], k[:size], parent[:size] = seed_bin, seed_k, -1
     score[:size], offset[:size], rest[:size] = seed_score, seed_offset, seed_rest
-    off_x, off_y, off_away, off_size = np.empty(1024, np.float32), np.empty(1024, np.float32), np.empty(1024, np.float32), 0
+    off_size = seed_place.shape[0]
+    off_room = max(1024, 2 * off_size)
+    off_x, off_y, off_away = np.empty(off_room, np.float32), np.empty(off_room, np.float32), np.empty(off_room, np.float32)
+    off_x[:off_size], off_y[:off_size], off_away[:off_size] = seed_place[:, 0], seed_place[:, 1], seed_away
     row_start = np.zeros(times + 1, np.int64)
     row_start[1] = size
     slot = np.full((tables[0].shape[0] - 1) * scale_count, -1, np.int32)
@@ -209,7 +214,6 @@ def forward(
     for t in range(1, times):
         begin, end = row_start[t - 1], row_start[t]
         size, best = end, _NOWHERE
-        off_begin = off_size
         course = 0.5 * (headings[t - 1] + headings[t])
         for i in range(begin, end):
             if bin_[i] >= 0:

@@ -1,0 +1,50 @@
+"""What the route search runs on: the drive, the lane graph, the scales, as the compiled kernel takes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from hippodrome.core.matching.lane_graph import LaneGraph, bin_cells, build_lane_graph
+from hippodrome.core.matching.search_config import OffNetworkCosts, RouteSearchConfig, SearchCosts
+from hippodrome.core.matching.track import Track, driven, make_track, scale_range
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.types import FloatArray, Visits
+
+Seeds: TypeAlias = tuple[Any, ...]  # of the kernel: bin, scale bin, score, offset, rest; place, metres off the network
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchField:
+    network: RoadNetwork
+    track: Track
+    log_scale: FloatArray  # (K,) centres of the scale bins, ln(metres per map unit)
+    graph: LaneGraph
+    costs: SearchCosts
+    off_network: OffNetworkCosts
+    bin_m: float
+
+
+def search_field(visits: Visits, network: RoadNetwork, config: RouteSearchConfig) -> SearchField:
+    """Fine bins over the whole network, and the drive in steps of about ``step_m``."""
+    low, high = scale_range(visits, network)
+    log_scale = np.arange(np.log(low), np.log(high) + config.scale_bin, config.scale_bin)
+    track = make_track(visits, min(config.step_m / np.sqrt(low * high), 0.25 * driven(visits)[-1]))
+    graph = build_lane_graph(network, track.step * np.exp(log_scale[-1]) + 4.0 * config.bin_m, config.bin_m)
+    return SearchField(network, track, log_scale, graph, config.costs, config.off_network, config.bin_m)
+
+
+def kernel_arguments(field: SearchField, heading_rad: FloatArray) -> tuple[Any, ...]:
+    """What both passes of the compiled search take, in its order."""
+    graph, costs, off = field.graph, field.costs, field.off_network
+    tables = graph.reach_start, graph.reach_bin, graph.reach_m, graph.reach_changes, graph.heading_rad, graph.lane
+    on_road = (
+        costs.heading_sigma_rad, costs.heading_limit_nats, costs.offset_gain, 0.5 * field.bin_m, costs.length_sigma_m,
+        costs.scale_step_nats, costs.lane_change_nats,
+    )  # fmt: skip
+    cells = bin_cells(graph)
+    grid = graph.points_m, cells.start, cells.bin, cells.origin_m[0], cells.origin_m[1], cells.size_m, cells.columns, cells.rows
+    off_road = off.return_nats, off.drift, off.turn_limit_rad, off.leave_nats, off.step_nats, off.spread_nats
+    return np.ascontiguousarray(heading_rad), field.track.step, np.exp(field.log_scale), tables, on_road, (*grid, *off_road)

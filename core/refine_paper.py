@@ -42,8 +42,8 @@ class PaperRefineConfig:
     max_iterations: int = 20
     bent_cost: float = 2.0  # J per vertex above which the map is taken to be too bent for one similarity: ``grow`` is tried
     growth_prefix: int = 300  # vertices laid on the roads as one piece: enough turns to find the scale, too few to drift
-    growth_step: int = 40  # vertices: over 200 m a map runs off by less than the radius of the candidates
-    growth_window: int = 160  # vertices that are still bent: what lies farther back has settled
+    growth_step: int = 10  # vertices: over 50 m a map runs off by less than the distance between roads
+    growth_window: int = 80  # vertices that are still bent, and that tell the local scale; what lies farther back has settled
     growth_rounds: int = 2
 
 
@@ -100,15 +100,26 @@ def grow(poses: FloatArray, edges: Edges, geometry: RoadGeometry, config: PaperR
 
     For maps that no similarity fits: heading and scale may drift as far as they like if they do so slowly.
     """
+    scale = 1.0  # of the window against the whole map
     for end in range(config.growth_step, len(poses) + config.growth_step, config.growth_step):
         end = min(end, len(poses))
         begin = max(0, end - config.growth_window)
-        inner, window = _edges_within(edges, begin, end), poses[begin:end]
+        inner, window = metric_edges(_edges_within(edges, begin, end), scale), poses[begin:end]
         for _ in range(config.growth_rounds):
             window, _ = optimise(window, inner, match(window, geometry, config.matching), config)
-        rest = se2.compose(window[-1], se2.between(poses[end - 1], poses[end:]))
-        poses = np.concatenate([poses[:begin], window, rest])
+        stretch = _stretch(window, inner)
+        scale *= stretch
+        rest = se2.between(poses[end - 1], poses[end:]) * [stretch, stretch, 1.0]
+        poses = np.concatenate([poses[:begin], window, se2.compose(window[-1], rest)])
     return poses
+
+
+def _stretch(poses: FloatArray, edges: Edges) -> float:
+    """Length of the odometry edges as optimised over their length as measured."""
+    odometry = _subset(edges, edges.kind == EdgeKind.ODOMETRY)
+    driven_m = np.linalg.norm(poses[odometry.target, :2] - poses[odometry.source, :2], axis=1).sum()
+    measured_m = np.linalg.norm(odometry.motion[:, :2], axis=1).sum()
+    return float(driven_m / measured_m) if measured_m > 0.0 else 1.0
 
 
 def _edges_within(edges: Edges, begin: int, end: int) -> Edges:

@@ -10,7 +10,7 @@ from importlib import import_module
 
 from benchmarks.table import Row, table
 
-NAMES = ("render",)
+NAMES = ("render", "mapping", "localization")
 
 
 def main(names: list[str]) -> int:

@@ -50,14 +50,20 @@ def _parser() -> argparse.ArgumentParser:
 
     evaluate = commands.add_parser("eval", help="run scenarios end to end and score them", description=_evaluate.__doc__)
     _scenario_options(evaluate, several=True)
-    evaluate.add_argument("--workers", type=_positive, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)")
+    evaluate.add_argument(
+        "--workers", type=_positive, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)"
+    )
     evaluate.add_argument("--out", type=Path, default=Path("out/eval"), metavar="DIR", help="results go here (default: out/eval)")
     evaluate.set_defaults(command=_evaluate)
 
     render = commands.add_parser("render", help="make the recordings of a scenario only", description=_render.__doc__)
     _scenario_options(render, several=False)
-    render.add_argument("--workers", type=_positive, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)")
-    render.add_argument("--out", type=Path, default=Path("out/render"), metavar="DIR", help="recordings go here (default: out/render)")
+    render.add_argument(
+        "--workers", type=_positive, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)"
+    )
+    render.add_argument(
+        "--out", type=Path, default=Path("out/render"), metavar="DIR", help="recordings go here (default: out/render)"
+    )
     render.set_defaults(command=_render)
 
     build = commands.add_parser("map", help="build the semi-metric map of a recording", description=_map.__doc__)
@@ -69,17 +75,27 @@ def _parser() -> argparse.ArgumentParser:
     refine = commands.add_parser("refine", help="turn a semi-metric map topometric", description=_refine.__doc__)
     refine.add_argument("map", type=Path, metavar="MAP.pbstream")
     refine.add_argument("--network", type=Path, required=True, metavar="NET.net.xml[.gz]")
-    refine.add_argument("--mode", choices=["default", "paper"], default="default", help="default: unknown start; paper: Eqs. (8)-(12)")
-    refine.add_argument("--start", type=_start_pose, metavar="X,Y,HEADING", help="known start: metres, degrees (mode paper needs it)")
-    refine.add_argument("--scenario", type=Path, metavar="SCENARIO.yaml", help="take the refinement's settings from this scenario")
+    refine.add_argument(
+        "--mode", choices=["default", "paper"], default="default", help="default: unknown start; paper: Eqs. (8)-(12)"
+    )
+    refine.add_argument(
+        "--start", type=_start_pose, metavar="X,Y,HEADING", help="known start: metres, degrees (mode paper needs it)"
+    )
+    refine.add_argument(
+        "--scenario", type=Path, metavar="SCENARIO.yaml", help="take the refinement's settings from this scenario"
+    )
     refine.add_argument("--out", type=Path, required=True, metavar="MAP.pbstream")
     refine.set_defaults(command=_refine)
 
-    localize = commands.add_parser("localize", help="localize a recorded drive in a topometric map", description=_localize.__doc__)
+    localize = commands.add_parser(
+        "localize", help="localize a recorded drive in a topometric map", description=_localize.__doc__
+    )
     localize.add_argument("map", type=Path, metavar="MAP.pbstream")
     localize.add_argument("recording", type=Path, metavar="RECORDING", help="folder of a recording")
     localize.add_argument("--network", type=Path, metavar="NET.net.xml[.gz]", help="lanes to pull the estimate to")
-    localize.add_argument("--scenario", type=Path, metavar="SCENARIO.yaml", help="take the localizer's settings from this scenario")
+    localize.add_argument(
+        "--scenario", type=Path, metavar="SCENARIO.yaml", help="take the localizer's settings from this scenario"
+    )
     localize.add_argument("--out", type=Path, required=True, metavar="TRAJECTORY.tum")
     localize.set_defaults(command=_localize)
     return parser

@@ -1,4 +1,7 @@
-"""The stages of an evaluation, each alone and on files: map, refine, localize. CPU time is this process's, frames decoded aside."""
+"""The stages of an evaluation, each alone and on files: map, refine, localize.
+
+CPU times are this process's, around the algorithms only: decoding frames is the simulator's part.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Normal equations of a chain of small blocks with a narrow border, solved directly in linear time.
 
 The unknowns are V blocks of ``B`` (one per visit, coupled to the next) and ``G`` that every block may depend on (gyro gain and
-bias). ``A = [[T, C], [C^T, D]]``: T block-tridiagonal, C (V, B, G), D (G, G). What couples distant blocks (loop closures) is left to
-conjugate gradients, which this factorisation preconditions.
+bias). ``A = [[T, C], [C^T, D]]``: T block-tridiagonal, C (V, B, G), D (G, G). What couples distant blocks (loop closures) is
+left to conjugate gradients, which this factorisation preconditions.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ def per_freedom(residual: FloatArray, weight: FloatArray, used: FloatArray) -> F
 def reestimated(noise: Noise, steps_sq: FloatArray, roads_sq: FloatArray, closure_median_sq: float | None) -> Noise:
     """Sigmas times the root of their squared residuals per degree of freedom.
 
-    ``steps_sq`` (4,): odometry; ``roads_sq`` (2 or more): across, heading; ``closure_median_sq``: median over closures, of 3 components.
+    ``steps_sq`` (4,): odometry; ``roads_sq`` (2 or more): across, heading; ``closure_median_sq``: over closures, of 3 components.
     """
     names = ("along", "across", "heading", "log_scale", "lateral_m", "lane_heading_rad")
     factors = np.sqrt(np.concatenate([steps_sq, roads_sq[:2]]))

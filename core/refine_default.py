@@ -13,7 +13,8 @@ import numpy as np
 
 from hippodrome.core.matching.confidence import ConfidenceConfig, breaks, judge
 from hippodrome.core.matching.route_line import RouteLine, route_line
-from hippodrome.core.matching.route_search import Route, RouteSearchConfig, search_route
+from hippodrome.core.matching.route_search import Route, search_route
+from hippodrome.core.matching.search_config import RouteSearchConfig
 from hippodrome.core.refinement_solver import Solution, SolverConfig, optimise
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import (

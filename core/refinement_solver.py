@@ -45,7 +45,10 @@ def optimise(
     vouched: FloatArray,
     config: SolverConfig,
 ) -> Solution:
-    """The most likely poses and scales of S visits that begin at ``arc_m`` (S,) of the line; ``vouched`` (S,) 1: on this road, 0: not known."""
+    """The most likely poses and scales of S visits, from their places ``arc_m`` (S,) on the line.
+
+    ``vouched`` (S,): 1 on this road, 0 not known.
+    """
     points, heading = on_line(line, arc_m)
     state = State(np.column_stack([points, heading]), log_scale, np.zeros(2))
     noise = Noise()
@@ -111,7 +114,8 @@ def reproject(line: RouteLine, points_m: FloatArray, arc_m: FloatArray, reach_m:
     cos, sin = np.cos(line.heading_rad[best]), np.sin(line.heading_rad[best])
     off = points_m - line.points_m[best]
     ahead = np.clip(cos * off[:, 0] + sin * off[:, 1], -spacing, spacing)
-    return line.arc_m[best] + ahead
+    nearest: FloatArray = line.arc_m[best] + ahead
+    return nearest
 
 
 def on_line(line: RouteLine, arc_m: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -47,7 +47,7 @@ def judge(route: Route, config: ConfidenceConfig) -> UInt8Array:
 
 
 CAUSES = {
-    MatchStatus.AMBIGUOUS: "another route, elsewhere in the network, explains the drive about as well; drive farther or give a start pose",
+    MatchStatus.AMBIGUOUS: "another route elsewhere explains the drive about as well; drive farther or give a start pose",
     MatchStatus.OFF_NETWORK: "no road of the network explains the drive here",
     MatchStatus.NO_ROUTE: "no route leads from the last matched place to the next",
 }

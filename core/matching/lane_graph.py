@@ -7,9 +7,11 @@ and a long one does not gather rounding errors.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import Float32Array, FloatArray, IntArray, UInt8Array
@@ -39,7 +41,7 @@ class LaneGraph:
 
 
 def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 1.0) -> LaneGraph:
-    """Cut every lane into bins and tabulate the bins within ``reach_limit_m`` ahead, lane changes to direct neighbours included."""
+    """Cut every lane into bins and tabulate those within ``reach_limit_m`` ahead, lane changes to direct neighbours included."""
     lengths = network.lane_lengths_m()
     counts = np.maximum(1, np.ceil(lengths / bin_m - 1e-9)).astype(np.int32)
     lane_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
@@ -47,9 +49,15 @@ def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 
     order = np.arange(len(lane)) - lane_start[lane]
     position = (order + 0.5) * (lengths / counts)[lane]
     tables = _reach_tables(
-        lane, position, lane_start, lengths, network.successor, network.successor_start, network.left_lane, network.right_lane,
+        lane,
+        position,
+        lane_start,
+        lengths,
+        network.successor,
+        network.successor_start,
+        (network.left_lane, network.right_lane),
         float(reach_limit_m),
-    )  # fmt: skip
+    )
     return LaneGraph(
         lane=lane,
         position_m=position,
@@ -128,15 +136,26 @@ def _headings_at(network: RoadNetwork, lane: IntArray, position_m: FloatArray, l
 
 @njit(cache=True)
 def _walk(
-    bin_, lane, position, lane_start, lengths, successor, successor_start, left, right, limit, stack, out_bin, out_m, out_changes
-):  # type: ignore[no-untyped-def]
-    """Fill ``out_*`` with what lies ahead of ``bin_``; returns the count. Counts only, if ``out_bin`` is empty."""
+    bin_: int,
+    lane: NDArray[Any],
+    position: NDArray[Any],
+    lane_start: NDArray[Any],
+    lengths: NDArray[Any],
+    successor: NDArray[Any],
+    successor_start: NDArray[Any],
+    sides: tuple[NDArray[Any], NDArray[Any]],
+    limit: float,
+    stack: NDArray[Any],
+    out: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
+) -> int:
+    """Fill ``out`` (bin, metres, lane changes) with what lies ahead of ``bin_``; returns the count. Counts only, if it is empty."""
+    out_bin, out_m, out_changes = out
     own = lane[bin_]
     fill = out_bin.shape[0] > 0
     size = 0
     count = 0
     for side in range(3):
-        first = own if side == 0 else (left[own] if side == 1 else right[own])
+        first = own if side == 0 else sides[side - 1][own]
         if first < 0:
             continue
         base = -position[bin_] if side == 0 else -position[bin_] * lengths[first] / max(lengths[own], 1e-6)
@@ -164,29 +183,34 @@ def _walk(
 
 
 @njit(cache=True)
-def _reach_tables(lane, position, lane_start, lengths, successor, successor_start, left, right, limit):  # type: ignore[no-untyped-def]
+def _reach_tables(
+    lane: NDArray[Any],
+    position: NDArray[Any],
+    lane_start: NDArray[Any],
+    lengths: NDArray[Any],
+    successor: NDArray[Any],
+    successor_start: NDArray[Any],
+    sides: tuple[NDArray[Any], NDArray[Any]],
+    limit: float,
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
     bins = lane.shape[0]
     stack = np.empty((_MAX_STACK, 3))
     start = np.zeros(bins + 1, np.int64)
-    none_bin, none_m, none_changes = np.empty(0, np.int32), np.empty(0, np.float32), np.empty(0, np.uint8)
+    nothing = np.empty(0, np.int32), np.empty(0, np.float32), np.empty(0, np.uint8)
     for i in range(bins):
-        start[i + 1] = start[i] + _walk(
-            i, lane, position, lane_start, lengths, successor, successor_start, left, right, limit, stack,
-            none_bin, none_m, none_changes,
-        )  # fmt: skip
-    reach_bin = np.empty(start[-1], np.int32)
-    reach_m = np.empty(start[-1], np.float32)
-    reach_changes = np.empty(start[-1], np.uint8)
+        ahead = _walk(i, lane, position, lane_start, lengths, successor, successor_start, sides, limit, stack, nothing)
+        start[i + 1] = start[i] + ahead
+    bin_ = np.empty(start[-1], np.int32)
+    metres = np.empty(start[-1], np.float32)
+    changes = np.empty(start[-1], np.uint8)
     for i in range(bins):
         row = slice(start[i], start[i + 1])
         if start[i + 1] == start[i]:
             continue
-        _walk(
-            i, lane, position, lane_start, lengths, successor, successor_start, left, right, limit, stack,
-            reach_bin[row], reach_m[row], reach_changes[row],
-        )  # fmt: skip
-        order = np.argsort(reach_m[row], kind="mergesort")
-        reach_bin[row] = reach_bin[row][order]
-        reach_m[row] = reach_m[row][order]
-        reach_changes[row] = reach_changes[row][order]
-    return start, reach_bin, reach_m, reach_changes
+        out = bin_[row], metres[row], changes[row]
+        _walk(i, lane, position, lane_start, lengths, successor, successor_start, sides, limit, stack, out)
+        order = np.argsort(metres[row], kind="mergesort")
+        bin_[row] = bin_[row][order]
+        metres[row] = metres[row][order]
+        changes[row] = changes[row][order]
+    return start, bin_, metres, changes

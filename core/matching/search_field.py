@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -36,8 +36,18 @@ def search_field(visits: Visits, network: RoadNetwork, config: RouteSearchConfig
     return SearchField(network, track, log_scale, graph, config.costs, config.off_network, config.bin_m)
 
 
-def kernel_arguments(field: SearchField, heading_rad: FloatArray) -> tuple[Any, ...]:
+class KernelArguments(NamedTuple):
     """What both passes of the compiled search take, in its order."""
+
+    heading_rad: FloatArray
+    step: float
+    scales: FloatArray
+    tables: tuple[Any, ...]
+    costs: tuple[Any, ...]
+    off: tuple[Any, ...]
+
+
+def kernel_arguments(field: SearchField, heading_rad: FloatArray) -> KernelArguments:
     graph, costs, off = field.graph, field.costs, field.off_network
     tables = graph.reach_start, graph.reach_bin, graph.reach_m, graph.reach_changes, graph.heading_rad, graph.lane
     on_road = (
@@ -47,4 +57,6 @@ def kernel_arguments(field: SearchField, heading_rad: FloatArray) -> tuple[Any, 
     cells = bin_cells(graph)
     grid = graph.points_m, cells.start, cells.bin, cells.origin_m[0], cells.origin_m[1], cells.size_m, cells.columns, cells.rows
     off_road = off.return_nats, off.drift, off.turn_limit_rad, off.leave_nats, off.step_nats, off.spread_nats
-    return np.ascontiguousarray(heading_rad), field.track.step, np.exp(field.log_scale), tables, on_road, (*grid, *off_road)
+    return KernelArguments(
+        np.ascontiguousarray(heading_rad), field.track.step, np.exp(field.log_scale), tables, on_road, (*grid, *off_road)
+    )

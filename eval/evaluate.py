@@ -183,7 +183,7 @@ def _network(materials: Materials) -> Network:
 
 def _configuration(scenario: Scenario) -> dict[str, Any]:
     """The effective configuration; of a network file only the name, so that results do not depend on where it lies."""
-    values = scenario.model_dump(mode="json")
+    values: dict[str, Any] = json.loads(scenario.model_dump_json())  # JSON has no infinity: such a limit becomes null
     if scenario.town.network is not None:
         values["town"]["network"] = scenario.town.network.name
     return values

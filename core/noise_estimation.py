@@ -27,9 +27,19 @@ class Noise:
         sigmas: FloatArray = root * np.array([self.along, self.across, self.heading, self.log_scale])
         return sigmas
 
+    def road_sigmas(self, curvature_1pm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Sigmas (N,) across the lane and of the lane's heading; bends are cut, and drawn as polylines."""
+        lateral = np.hypot(self.lateral_m, BEND_CUT_M2 * curvature_1pm)
+        heading = np.hypot(self.lane_heading_rad, BEND_SHIFT_M * curvature_1pm)
+        return lateral, heading
 
+
+BEND_CUT_M2 = (
+    2.0  # metres off the centreline per 1/m of curvature: a rear axle 2.7 m behind the front one cuts 2.7^2 / 2 = 3.6 at most
+)
+BEND_SHIFT_M = 1.0  # along-track shift between the bend that is drawn and the one that is driven
 STANDSTILL_M = 0.1  # a step shorter than this is as uncertain as this: quantised motions, gyro noise while standing
-FLOORS = {"along": 0.005, "across": 0.005, "heading": 0.0005, "log_scale": 0.0003, "lateral_m": 0.05, "lane_heading_rad": 0.01}
+FLOORS = {"along": 0.005, "across": 0.005, "heading": 0.0005, "log_scale": 0.0003, "lateral_m": 0.1, "lane_heading_rad": 0.01}
 # below these, no sensor or driver is believable, and the equations lose their condition
 
 

@@ -33,6 +33,7 @@ class Targets:
 
     points_m: FloatArray  # (S, 2)
     heading_rad: FloatArray  # (S,) of the lane
+    curvature_1pm: FloatArray  # (S,) of the lane, without sign
     on_road: FloatArray  # (S,) 1, or 0 where nothing vouches for the road
     along_sigma_m: float  # inf: point to line
 
@@ -73,13 +74,14 @@ def road(state: State, targets: Targets, noise: Noise) -> Group:
     """Components: across the lane and lane heading (Huber), along the lane."""
     cos, sin = np.cos(targets.heading_rad), np.sin(targets.heading_rad)
     off = state.poses[:, :2] - targets.points_m
-    across = (-sin * off[:, 0] + cos * off[:, 1]) / noise.lateral_m
+    lateral, turned_sigma = noise.road_sigmas(targets.curvature_1pm)
+    across = (-sin * off[:, 0] + cos * off[:, 1]) / lateral
     along = (cos * off[:, 0] + sin * off[:, 1]) / targets.along_sigma_m
-    turned = wrap(state.poses[:, 2] - targets.heading_rad) / noise.lane_heading_rad
+    turned = wrap(state.poses[:, 2] - targets.heading_rad) / turned_sigma
     residual = np.column_stack([across, turned, along])
     here = np.zeros((len(off), 3, 4))
-    here[:, 0, 0], here[:, 0, 1] = -sin / noise.lateral_m, cos / noise.lateral_m
-    here[:, 1, 2] = 1.0 / noise.lane_heading_rad
+    here[:, 0, 0], here[:, 0, 1] = -sin / lateral, cos / lateral
+    here[:, 1, 2] = 1.0 / turned_sigma
     here[:, 2, 0], here[:, 2, 1] = cos / targets.along_sigma_m, sin / targets.along_sigma_m
     weight = np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12))
     weight[:, 2] = 1.0

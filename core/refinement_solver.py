@@ -56,11 +56,19 @@ def optimise(
     for along_sigma_m in config.along_sigma_m:
         arc_m = reproject(line, state.poses[:, :2], arc_m, config.reprojection_m)
         points, heading = on_line(line, arc_m)
-        targets = Targets(points, heading, on_road, along_sigma_m)
+        targets = Targets(points, heading, curvature(line, arc_m), on_road, along_sigma_m)
         for _ in range(config.inner_iterations):
             state, factor = gauss_newton_step(state, visits, edges, targets, noise)
         noise = estimate_noise(state, visits, edges, targets, noise, factor)
     return Solution(state, arc_m, noise, calibrated(marginals(factor)[0], noise, config))
+
+
+def curvature(line: RouteLine, arc_m: FloatArray, half_m: float = 4.0) -> FloatArray:
+    """Curvature (S,) without sign, 1/m, over ``half_m`` (a car's length) either way."""
+    heading = np.unwrap(line.heading_rad)
+    turned = np.interp(arc_m + half_m, line.arc_m, heading) - np.interp(arc_m - half_m, line.arc_m, heading)
+    magnitude: FloatArray = np.abs(turned) / (2.0 * half_m)
+    return magnitude
 
 
 def calibrated(covariance: FloatArray, noise: Noise, config: SolverConfig) -> FloatArray:

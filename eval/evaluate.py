@@ -41,7 +41,7 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
     """Map, refine in both modes, localize, score, draw; everything is written below ``out/<scenario name>``."""
     materials = gather(task.scenario, task.out)
     truth, duration_s = materials.mapping.ground_truth(), materials.duration_s
-    reckoned, reckoning_s = dead_reckoning(materials.mapping.observations())
+    reckoned, reckoning_s = dead_reckoning(materials.mapping.self_motion())
     semi_metric, mapping_s = map_recording(materials.mapping.observations(), materials.scenario.mapper)
     map_bytes = save_map(materials.folder / "semi-metric.pbstream", semi_metric, _provenance(materials, SEMI_METRIC))
     at_vertices = Trajectory(semi_metric.t_s, interpolate(reckoned.t_s, reckoned.poses, semi_metric.t_s))

@@ -51,6 +51,10 @@ class Recording:
         for i, number in enumerate(self.samples.frame):
             yield self.samples.observation(i, self.frame(int(number)) if number >= 0 else None)
 
+    def self_motion(self) -> Iterator[Observation]:
+        """The observations of a blindfolded vehicle: no frame is decoded."""
+        return (self.samples.observation(i, None) for i in range(len(self.samples.t_s)))
+
     def ground_truth(self) -> Trajectory:
         """The reference for scoring."""
         return Trajectory(t_s=self.samples.t_s, poses=self.samples.poses_m)

@@ -19,6 +19,8 @@ $(VENV)/.ready: pyproject.toml constraints.txt build_proto.py $(wildcard proto/*
 	@echo "installing hippodrome and its packages into $(VENV) (a minute or two)"
 	@$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
 	@$(BIN)/python -m hippodrome.sim.render.probe --install
+	@echo "compiling the inner loops (half a minute)"
+	@$(BIN)/python -m hippodrome.eval.warm_up
 	@touch $@
 
 setup: $(VENV)/.ready  ## install everything into .venv (the other targets do this themselves)

@@ -20,6 +20,7 @@ from hippodrome.eval.results import Network, Row, ScenarioResult, summarize, sum
 from hippodrome.eval.scenario_figures import draw_scenario
 from hippodrome.eval.stages import dead_reckoning, localize_recording, map_recording, refine_map
 from hippodrome.eval.trajectory_io import write_tum
+from hippodrome.eval.warm_up import warm_up
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.proto.codec import save_map
 from hippodrome.sim.recording import Recording
@@ -39,6 +40,7 @@ class EvaluationTask:
 
 def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
     """Map, refine in both modes, localize, score, draw; everything is written below ``out/<scenario name>``."""
+    warm_up()
     materials = gather(task.scenario, task.out)
     truth, duration_s = materials.mapping.ground_truth(), materials.duration_s
     reckoned, reckoning_s = dead_reckoning(materials.mapping.self_motion())

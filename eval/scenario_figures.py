@@ -34,6 +34,8 @@ def draw_scenario(
     draw_maps_over_truth(folder / "maps.png", materials.roads, truth.poses, placed, f"{name}: maps over ground truth")
     for method, one in found.items():
         _draw_topometric(materials, method, one)
+    if found:
+        _draw_neurodynamics(materials, *list(found.items())[-1])
 
 
 def _placed(one: Scored, truth: Trajectory) -> FloatArray:
@@ -44,18 +46,23 @@ def _placed(one: Scored, truth: Trajectory) -> FloatArray:
 
 
 def _draw_topometric(materials: Materials, method: str, one: Topometric) -> None:
-    """APE on the map; the second drive's error; and the networks while its estimate settles (the paper's Fig. 4 A-D)."""
+    """APE on the map, and the second drive's error."""
     name, path = materials.scenario.name, materials.folder / file_stem(method)
     errors_m, localized = one.scored.ape.errors_m, one.localized
     draw_error_map(path.with_name(f"{path.name}-ape.png"), materials.roads, one.scored.trajectory.poses, errors_m,
                    f"{name}: {method}, APE on the map")  # fmt: skip
     draw_localization_error(path.with_name(f"{path.name}-localization.png"), localized.t_s, localized.errors_m,
                             localized.localized, f"{name}: localization in the map '{method}'")  # fmt: skip
+
+
+def _draw_neurodynamics(materials: Materials, method: str, one: Topometric) -> None:
+    """Frames, grid cells, head direction and error while the estimate settles (the paper's Fig. 4 A-D)."""
+    name, path, localized = materials.scenario.name, materials.folder / "neurodynamics.png", one.localized
     samples = materials.drive.samples
     steps = samples.frame_steps[strip_steps(samples.t_s[samples.frame_steps])]
     frames = [materials.drive.frame(int(samples.frame[step])) for step in steps]
     shown = [one.localization.estimates[step] for step in steps]
-    draw_localization_strip(path.with_name(f"{path.name}-neurodynamics.png"), frames, shown, localized.t_s, localized.errors_m,
+    draw_localization_strip(path, frames, shown, localized.t_s, localized.errors_m,
                             title=f"{name}: localization in the map '{method}' from an unknown start")  # fmt: skip
 
 

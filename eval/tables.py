@@ -6,8 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from hippodrome.eval.results import ErrorSummary, Results, Row, ScenarioResult
 
@@ -101,18 +103,52 @@ def table_one_markdown(results: Results, quoted: Sequence[Row] = ()) -> str:
     return "\n".join(_scenario_markdown(scenario, quoted) for scenario in results.scenarios)
 
 
+def _short(value: float | None) -> str:
+    """Three digits: a terminal is narrow."""
+    if value is None:
+        return NONE
+    return f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
+
+
+TERMINAL_COLUMNS = (  # fit 80 characters; table1.md has the rest
+    Column("CPU %", lambda row: _short(row.cpu_percent)),
+    Column("MB", lambda row: NONE if row.map_bytes is None else _short(row.map_bytes / MEGABYTE)),
+    Column("APE m", lambda row: NONE if row.ape is None else _short(row.ape.mean_m)),
+    Column("worst", lambda row: NONE if row.ape is None else _short(row.ape.max_m)),
+    Column("RPE m", lambda row: NONE if row.rpe is None else _short(row.rpe.mean_m)),
+    Column("20 m", lambda row: NONE if row.rpe_20m is None else _short(row.rpe_20m.mean_m)),
+    Column("loc m", lambda row: _localization(row, _short, "error_mean_m")),
+    Column("fix m", lambda row: _localization(row, _short, "initial_distance_m")),
+    Column("false", lambda row: _localization(row, _count, "false_fixes")),
+)
+TERMINAL_NOTE = (
+    "Means over the vertices: APE, its worst, RPE between consecutive vertices and over 20 m. Second drive: loc, its error "
+    "once localized; fix, metres driven until then; false, confident fixes over 20 m off."
+)
+
+
 def print_table_one(results: Results, quoted: Sequence[Row], console: Console) -> None:
-    """The same tables on a terminal."""
+    """A narrow table per scenario, the quoted rows once, failures beneath."""
     for scenario in results.scenarios:
-        rows = (*scenario.rows, *quoted)
-        console.print(_rich_table(scenario_title(scenario), MAPPING_COLUMNS, rows))
-        if located := _with_localization(rows):
-            console.print(_rich_table(f"{scenario.name}: localization from an unknown start", LOCALIZATION_COLUMNS, located))
-        for row in rows:
+        console.print(_terminal_table(scenario_title(scenario), scenario.rows))
+        for row in scenario.rows:
             if row.failure is not None:
                 console.print(f"{row.method}: FAILED: {row.failure}", markup=False, style="red", highlight=False)
     if quoted:
+        console.print(_terminal_table(f"the paper {QUOTED_MARK}", quoted))
+    console.print(TERMINAL_NOTE, markup=False, style="dim", highlight=False)
+    if quoted:
         console.print(QUOTED_NOTE, markup=False, style="dim", highlight=False)
+
+
+def _terminal_table(title: str, rows: Sequence[Row]) -> Table:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, title=Text(title, style="bold"), title_justify="left")
+    table.add_column("method", min_width=18, max_width=20)
+    for column in TERMINAL_COLUMNS:
+        table.add_column(column.title, justify="right", no_wrap=True, min_width=4)
+    for row in rows:
+        table.add_row(Text(row.method), *(column.cell(row) for column in TERMINAL_COLUMNS))
+    return table
 
 
 def scenario_title(scenario: ScenarioResult) -> str:
@@ -153,28 +189,18 @@ def _with_localization(rows: Sequence[Row]) -> list[Row]:
 
 
 def _markdown_table(columns: Sequence[Column], rows: Sequence[Row]) -> str:
-    columns = _filled(columns, rows)
+    columns = filled_columns(columns, rows)
     lines = [[column.title for column in columns], ["---", *["---:"] * (len(columns) - 1)]]
-    lines += [[_escaped(text) for text in _cells(columns, row)] for row in rows]
+    lines += [[_escaped(text) for text in row_cells(columns, row)] for row in rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _rich_table(title: str, columns: Sequence[Column], rows: Sequence[Row]) -> Table:
-    columns = _filled(columns, rows)
-    table = Table(title=title, title_justify="left", title_style="bold")
-    for column in columns:
-        table.add_column(column.title, justify="left" if column is columns[0] else "right", overflow="fold")
-    for row in rows:
-        table.add_row(*_cells(columns, row), style="red" if row.failure is not None else "dim" if row.quoted else None)
-    return table
-
-
-def _cells(columns: Sequence[Column], row: Row) -> list[str]:
+def row_cells(columns: Sequence[Column], row: Row) -> list[str]:
     cells = [column.cell(row) for column in columns]
     return cells if row.failure is None else [f"{cells[0]} (FAILED)", *cells[1:]]
 
 
-def _filled(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
+def filled_columns(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
     """The columns in which at least one row has something to say."""
     return [column for column in columns if any(column.cell(row) != NONE for row in rows)]
 

@@ -84,4 +84,5 @@ def test_the_terminal_shows_the_same(width):
     text = stream.getvalue()
     assert "lost | after frame 3" in text
     assert "rural: generated, rural, 7.2 km of road, seed 4, noise paper, 14,717 frames" in " ".join(text.split())
-    assert ("0.20 / 0.90 / 12.35" in text) or width == 80
+    assert "12.3" in text  # the worst error
+    assert "…" not in text

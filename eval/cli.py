@@ -66,6 +66,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     render.set_defaults(command=_render)
 
+    report = commands.add_parser("report", help="write DIR/report.html anew", description=_report.__doc__)
+    report.add_argument("results", type=Path, metavar="DIR", help="folder with results.json")
+    report.set_defaults(command=_report)
+
     build = commands.add_parser("map", help="build the semi-metric map of a recording", description=_map.__doc__)
     build.add_argument("recording", type=Path, metavar="RECORDING", help="folder of a recording")
     build.add_argument("--scenario", type=Path, metavar="SCENARIO.yaml", help="take the mapper's settings from this scenario")
@@ -143,6 +147,14 @@ def _render(options: argparse.Namespace) -> int:
     from hippodrome.eval.run import render
 
     render(options.scenarios, options.network, options.seed, options.workers, options.out)
+    return DONE
+
+
+def _report(options: argparse.Namespace) -> int:
+    """Make DIR/report.html from DIR/results.json and the files beside it."""
+    from hippodrome.eval.report import write_report
+
+    print(write_report(options.results))
     return DONE
 
 

@@ -16,6 +16,7 @@ from hippodrome.eval.localization_score import score_localization
 from hippodrome.eval.map_quality import closures, matched_lane_accuracy, matched_lane_ids, score_closures
 from hippodrome.eval.materials import Materials, Scored, Topometric, file_stem, gather, score_trajectory
 from hippodrome.eval.metrics import ape
+from hippodrome.eval.report_evidence import write_map_evidence
 from hippodrome.eval.results import Network, Row, ScenarioResult, summarize, summarize_localization
 from hippodrome.eval.scenario_figures import draw_scenario
 from hippodrome.eval.stages import dead_reckoning, localize_recording, map_recording, refine_map
@@ -74,6 +75,7 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
             rows.append(_topometric_row(method, found[method], materials.mapping, cpu_percent))
     scored |= {method: topometric.scored for method, topometric in found.items()}
     _write_evidence(materials, scored, found)
+    write_map_evidence(materials, scored, found)
     draw_scenario(materials, semi_metric, scored, found)
     return _result(materials, rows, mapping_s, found)
 

@@ -13,6 +13,7 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.paper_rows import quoted_rows
 from hippodrome.eval.pool import Workers, worker_pool
+from hippodrome.eval.report import REPORT, write_report
 from hippodrome.eval.results import Results, ScenarioResult, write_results
 from hippodrome.eval.tables import print_table_one, table_one_markdown
 from hippodrome.eval.thresholds import failed_limits
@@ -37,6 +38,7 @@ def evaluate(paths: Sequence[Path], network: Path | None, seed: int | None, work
     results = Results(scenarios=tuple(rows))
     write_results(out / RESULTS, results)
     write_atomically(out / "table1.md", table_one_markdown(results, quoted_rows()).encode())
+    write_report(out)
     return _report(scenarios, results, out)
 
 
@@ -86,7 +88,7 @@ def _report(scenarios: Sequence[Scenario], results: Results, out: Path) -> bool:
     ]
     for failure in failures:
         print(f"threshold failed: {failure}", file=sys.stderr)
-    print(f"\nresults: {out / RESULTS}\ntables:  {out / 'table1.md'}\nfigures: {out}/<scenario>/*.png")
+    print(f"\nresults: {out / RESULTS}\ntables:  {out / 'table1.md'}\nfigures: {out}/<scenario>/*.png\nreport:  {out / REPORT}")
     return not failures
 
 

@@ -1,0 +1,56 @@
+"""HTML that cannot be injected into: text is escaped unless it was made here."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable
+from typing import TypeAlias
+
+from pydantic import BaseModel
+
+VOID = frozenset({"img", "meta", "input", "br"})
+
+
+class Html(str):
+    """Markup. Every other string is text and is escaped when it enters an element."""
+
+    __slots__ = ()
+
+
+Child: TypeAlias = "str | Html | Iterable[str | Html] | None"
+
+
+def element(tag: str, /, *children: Child, **attributes: str | int | bool | None) -> Html:
+    """One element. Attribute names lose a trailing ``_`` and read ``-`` for ``_``; False and None leave the attribute out."""
+    start = f"<{tag}{''.join(_attribute(key, value) for key, value in attributes.items())}>"
+    return Html(start if tag in VOID else f"{start}{joined(*children)}</{tag}>")
+
+
+def joined(*children: Child) -> Html:
+    """Markup and escaped text, one after the other."""
+    return Html("".join(_text(child) for child in children))
+
+
+def data_script(model: BaseModel) -> Html:
+    """A model as JSON for the page's own script; no text in it can end the element."""
+    text = model.model_dump_json()
+    for character in "<>&":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return Html(f'<script type="application/json">{text}</script>')
+
+
+def _text(child: Child) -> str:
+    if child is None:
+        return ""
+    if isinstance(child, Html):
+        return str(child)
+    if isinstance(child, str):
+        return html.escape(child)
+    return "".join(_text(part) for part in child)
+
+
+def _attribute(name: str, value: str | int | bool | None) -> str:
+    if value is None or value is False:
+        return ""
+    key = name.rstrip("_").replace("_", "-")
+    return f" {key}" if value is True else f' {key}="{html.escape(str(value))}"'

@@ -2,7 +2,8 @@
 
 Per observation: path integration moves the networks. Per look, once the view has changed enough: the frame is scored against
 all view cells, the scores are filtered along the paths of the map, and a cell that stands out is reactivated. Its pose is
-injected where it agrees with the belief; where it does not, it becomes a challenger that has to win by further evidence.
+injected where it agrees with the belief, with less weight where it only shows the same place; where it shows another place, it
+becomes a challenger that has to win by further evidence. Evidence is counted in looks: standing still adds none and loses none.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from hippodrome.core.localizer_config import Injection, LocalizerConfig
 from hippodrome.core.localizer_kalman import KalmanPose
 from hippodrome.core.localizer_motion import Motion
 from hippodrome.core.localizer_paper import PaperPose
+from hippodrome.core.localizer_places import is_same_place
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.sequence_filter import standardise
 from hippodrome.core.types import (
@@ -28,6 +30,7 @@ from hippodrome.core.types import (
     Frame,
     HippodromeError,
     LocalizationEstimate,
+    LocalizationStatus,
     Observation,
 )
 
@@ -62,7 +65,9 @@ class Localizer:
         self._step_m, self._turned_rad = 0.0, 0.0  # since the last look
         self._fixed = False  # an incumbent has been adopted
         self._evidence = 0.0  # mode "paper": summed margins so far
-        self._challenge = 0.0  # summed margins of the challenger
+        self._support, self._challenge = 0.0, 0.0  # summed margins of the incumbent and the challenger, as far as remembered
+        self._sq_map: FloatArray = np.zeros((3, 3))  # error of the map where it was recognised last
+        self._mapped = True  # as far as known
         self._margin, self._cell = 0.0, -1
 
     def step(self, observation: Observation) -> LocalizationEstimate:
@@ -90,8 +95,10 @@ class Localizer:
         self._margin = localizer_places.margin(places, self._filtered, self._cell)
         self._view_step = view_step.restart(self._view_step)
         self._step_m, self._turned_rad = 0.0, 0.0
+        self._support, self._challenge = config.evidence_memory * self._support, config.evidence_memory * self._challenge
         if self._margin >= config.margin and places.usable[self._cell]:
             self._reactivate(self._injection(similarity))
+        self._mapped = localizer_places.is_mapped(places, self._belief.pose, _sigma_m(self._belief.covariance))
 
     def _filter(self, similarity: Float32Array) -> Float32Array:
         sequence, places = self._config.sequence, self._places
@@ -119,32 +126,53 @@ class Localizer:
         if isinstance(belief, PaperPose):
             self._belief, self._evidence = belief.inject(injection), self._evidence + self._margin
             self._fixed = self._evidence >= config.fix_evidence
-        elif self._fixed and belief.sq_distance(injection) <= gate:
-            self._belief, self._challenge = belief.inject(injection), 0.0
+            self._sq_map = self._places.sq_map[self._cell]
+        elif self._fixed and (belief.sq_distance(injection) <= gate or is_same_place(belief.pose, injection.pose)):
+            self._support_incumbent(belief, injection)
         elif belief.challenged and belief.sq_distance(injection, challenger=True) <= gate:
             self._belief = belief.reinforce(injection)
             self._challenge += self._margin
-            if self._challenge >= config.fix_evidence:
-                self._belief, self._fixed, self._challenge = self._belief.adopt(), True, 0.0
+            if self._challenge >= config.fix_evidence + self._support:
+                self._belief, self._fixed = self._belief.adopt(), True
+                self._support, self._challenge = min(self._challenge, config.fix_evidence), 0.0
+                self._sq_map = self._places.sq_map[self._cell]
         else:
             self._belief, self._challenge = belief.challenge(injection), self._margin
 
+    def _support_incumbent(self, belief: AttractorPose | KalmanPose, injection: Injection) -> None:
+        """An outlier within the same place counts as much as a view at the gate: Student's weight, Huber's reason."""
+        excess = max(1.0, belief.sq_distance(injection) / self._config.injection.gate)
+        self._belief = belief.inject(Injection(injection.pose, excess * injection.covariance))
+        self._support, self._challenge = min(self._support + self._margin, self._config.fix_evidence), 0.0
+        self._sq_map = self._places.sq_map[self._cell]
+
     def _estimate(self, t_s: float) -> LocalizationEstimate:
-        belief, config = self._belief, self._config
-        covariance = belief.covariance
-        sigma_m = float(np.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])))
-        doubted = self._challenge >= config.doubt_evidence
-        covariance[0, 0] += config.injection.map_m**2
-        covariance[1, 1] += config.injection.map_m**2
+        belief = self._belief
+        status = self._status(_sigma_m(belief.covariance))
         return LocalizationEstimate(
             t_s=t_s,
             pose=belief.pose,
-            covariance=covariance,
-            localized=self._fixed and sigma_m < config.lost_sigma_m and not doubted,
+            covariance=belief.covariance + self._sq_map,
+            localized=status in (LocalizationStatus.LOCALIZED, LocalizationStatus.OFF_MAP),
             confidence=self._margin,
             view_cell=self._cell,
             **_activity(belief),
+            status=status,
         )
+
+    def _status(self, sigma_m: float) -> LocalizationStatus:
+        if not self._fixed:
+            return LocalizationStatus.UNKNOWN
+        if sigma_m >= self._config.lost_sigma_m:
+            return LocalizationStatus.LOST
+        if self._challenge >= max(self._config.doubt_evidence, self._support):
+            return LocalizationStatus.DOUBTED
+        return LocalizationStatus.LOCALIZED if self._mapped else LocalizationStatus.OFF_MAP
+
+
+def _sigma_m(covariance: FloatArray) -> float:
+    """Standard deviation of the position, the mean over directions."""
+    return float(np.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])))
 
 
 def _unknown(cognitive_map: CognitiveMap, config: LocalizerConfig) -> PoseBelief:

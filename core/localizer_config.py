@@ -28,14 +28,14 @@ class MotionNoise:
 
 @dataclass(frozen=True)
 class InjectionNoise:
-    """How well a reactivated view tells the pose; the map's own error is ``map_m`` and cannot be averaged away."""
+    """How well a reactivated view tells the pose. The map's own error is the map's to state and cannot be averaged away."""
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
     along_m: float = 1.2  # best match among views 5 m apart, parabola between them, 0.7 m; consecutive errors correlate
-    across_m: float = 0.8  # two drivers' wander inside a lane, correlated over tens of metres
+    across_m: float = 0.5  # two drivers' wander inside a lane, correlated over tens of metres
     heading_rad: float = 0.05
-    map_m: float = 0.4  # of a refined map, added to the reported covariance
+    map_m: float = 0.4  # along the road, beyond what the map's covariance says: that takes self-motion's errors for white
     gate: float = 12.0  # squared Mahalanobis distance beyond which an injection conflicts (3 dof: 99.3 %)
 
 
@@ -73,7 +73,8 @@ class LocalizerConfig:
     paper: PaperNetworks = field(default_factory=PaperNetworks)
     margin: float = 1.2  # filtered margin at which a view cell is reactivated: 87 % right on its own
     fix_evidence: float = 4.0  # summed margin of agreeing reactivations that makes a fix or overturns one
-    doubt_evidence: float = 1.5  # of a challenger, at which "localized" is taken back
+    doubt_evidence: float = 1.5  # of a challenger, at which "localized" is taken back; the incumbent's own holds against it
+    evidence_memory: float = 0.6  # of either's evidence, per look that does not renew it: like the sequence filter's
     lost_sigma_m: float = 6.0  # "localized" is taken back when the position's standard deviation exceeds this
     lane_sigma_m: float = 0.5  # of a driver about the lane's centre; 0: no lane pull
     step_tolerance_m: float = 3.5  # of a look's travel along the map: scale and spacing differ between drives

@@ -23,6 +23,7 @@ LINK_REACH_M = 15.0  # longest step between two looks; at 30 km/h they are 5 m a
 LINK_BEND_RAD = 0.35  # the chord of a link points half its turn ahead, within this
 LINK_TURN_RAD = 1.2  # no vehicle turns more within one link
 SAME_PLACE_M = 15.0  # cells closer than this show the same place and are no rivals
+SURE_SIGMAS = 2.0  # a position is taken to be within these of where it is believed
 SAME_WAY_RAD = math.radians(30.0)  # lanes and cells that lead the same way
 LANE_REACH_M = 5.0  # a second lane of the same way within this: which one is driven is unknown
 
@@ -33,6 +34,8 @@ class Places:
 
     bank: ViewCellBank
     poses_m: FloatArray  # (C, 3)
+    sq_map: FloatArray  # (C, 3, 3) error of the map itself, m, m, rad
+    tree: cKDTree  # over the positions
     usable: NDArray[np.bool_]  # (C,) the refinement vouches for the pose
     before: IntArray  # (C,) cell of the visit before, -1: none near
     after: IntArray  # (C,)
@@ -46,13 +49,45 @@ def places_of(cognitive_map: CognitiveMap, network: RoadNetwork | None, lane_sig
     """The places of a topometric map; its poses are drawn to the lane's centre where a single lane fits."""
     cells = len(cognitive_map.view_cells.templates)
     vertex = _first_vertex(cognitive_map.view_cell, cells)
-    poses = cognitive_map.poses[vertex]
+    poses, sq_map = cognitive_map.poses[vertex], _map_covariance(cognitive_map, vertex, map_sigma_m)
     if network is not None and lane_sigma_m > 0.0:
-        poses = centred(poses, network, map_sigma_m**2 / (map_sigma_m**2 + lane_sigma_m**2))
+        sq_across = across(sq_map, poses[:, 2])
+        poses = centred(poses, network, sq_across / (sq_across + lane_sigma_m**2))
     match = cognitive_map.road_match
     usable = np.ones(cells, dtype=np.bool_) if match is None else match.status[vertex] == MatchStatus.MATCHED
     before, after = _neighbours(vertex, cognitive_map, poses)
-    return Places(bank_of(cognitive_map.view_cells), poses, usable, before, after, *_links(poses))
+    tree = cKDTree(poses[:, :2])
+    return Places(bank_of(cognitive_map.view_cells), poses, sq_map, tree, usable, before, after, *_links(poses, tree))
+
+
+def _map_covariance(cognitive_map: CognitiveMap, vertex: IntArray, sigma_m: float) -> FloatArray:
+    """(C, 3, 3) what the refinement states of each cell's vertex and ``sigma_m`` along the road; or that alone."""
+    if cognitive_map.covariance is None:
+        return np.tile(np.diag([sigma_m**2, sigma_m**2, 0.0]), (len(vertex), 1, 1))
+    heading_rad = cognitive_map.poses[vertex, 2]
+    ahead = np.stack([np.cos(heading_rad), np.sin(heading_rad), np.zeros(len(vertex))], axis=1)
+    covariance: FloatArray = cognitive_map.covariance[vertex] + sigma_m**2 * ahead[:, :, None] * ahead[:, None, :]
+    return covariance
+
+
+def across(covariance: FloatArray, heading_rad: FloatArray) -> FloatArray:
+    """Variance (N,) across the heading, of covariances (N, 3, 3)."""
+    left = np.stack([-np.sin(heading_rad), np.cos(heading_rad)], axis=1)
+    variance: FloatArray = np.einsum("ni,nij,nj->n", left, covariance[:, :2, :2], left)
+    return variance
+
+
+def is_same_place(pose_m: FloatArray, other_m: FloatArray) -> bool:
+    """Whether two poses (3,) show the same street from the same side: what divides them is noise, not another hypothesis."""
+    turn_rad = abs(float(se2.wrap(other_m[2] - pose_m[2])))
+    return math.dist(pose_m[:2], other_m[:2]) < SAME_PLACE_M and turn_rad < LINK_TURN_RAD
+
+
+def is_mapped(places: Places, pose_m: FloatArray, sigma_m: float) -> bool:
+    """Whether a road that leads the way of ``pose_m`` (3,) was mapped there, or may have been for all that is known."""
+    near = places.tree.query_ball_point(pose_m[:2], SAME_PLACE_M + SURE_SIGMAS * sigma_m)
+    turn_rad = np.abs(se2.wrap(places.poses_m[near, 2] - pose_m[2]))
+    return bool((turn_rad < LINK_TURN_RAD).any())
 
 
 def _first_vertex(view_cell: IntArray, cells: int) -> IntArray:
@@ -75,9 +110,9 @@ def _neighbours(vertex: IntArray, cognitive_map: CognitiveMap, poses: FloatArray
     return around[0], around[1]
 
 
-def _links(poses: FloatArray) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+def _links(poses: FloatArray, tree: cKDTree) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
     """Pairs of cells that one step of driving connects, a cell and itself included (a step shorter than the spacing)."""
-    pairs = cKDTree(poses[:, :2]).query_pairs(LINK_REACH_M, output_type="ndarray")
+    pairs = tree.query_pairs(LINK_REACH_M, output_type="ndarray")
     own = np.arange(len(poses))
     source = np.concatenate([pairs[:, 0], pairs[:, 1], own])
     target = np.concatenate([pairs[:, 1], pairs[:, 0], own])
@@ -160,12 +195,12 @@ def peak_offset(back_m: float, ahead_m: float, fall_back: float, fall_ahead: flo
     return min(max(0.5 * slope / curvature, -0.5 * back_m), 0.5 * ahead_m)
 
 
-def centred(poses_m: FloatArray, network: RoadNetwork, share: float) -> FloatArray:
-    """Poses drawn sideways by ``share`` of the way to the lane's centre, where exactly one lane of their way is near."""
+def centred(poses_m: FloatArray, network: RoadNetwork, share: FloatArray) -> FloatArray:
+    """Poses drawn sideways by ``share`` (N,) of the way to the lane's centre, where exactly one lane of their way is near."""
     lanes = road_geometry.project(road_geometry.road_geometry(network), poses_m[:, :2], LANE_REACH_M)
     same_way = np.abs(se2.wrap(lanes.heading_rad - poses_m[lanes.point, 2])) < SAME_WAY_RAD
     fits = np.bincount(lanes.point[same_way], minlength=len(poses_m)) == 1
     row = np.flatnonzero(same_way & fits[lanes.point])
     pulled = poses_m.copy()
-    pulled[lanes.point[row], :2] += share * (lanes.foot_m[row] - poses_m[lanes.point[row], :2])
+    pulled[lanes.point[row], :2] += share[lanes.point[row], None] * (lanes.foot_m[row] - poses_m[lanes.point[row], :2])
     return pulled

@@ -80,6 +80,16 @@ class MatchStatus(IntEnum):
     NO_ROUTE = 3
 
 
+class LocalizationStatus(IntEnum):
+    """How the localizer stands to its own answer."""
+
+    UNKNOWN = 0  # no fix yet
+    LOCALIZED = 1
+    OFF_MAP = 2  # dead reckoning from the last fix has left every mapped road
+    DOUBTED = 3  # views vouch for another place more than for this one
+    LOST = 4  # the fix is too old to say where
+
+
 @dataclass(frozen=True, slots=True)
 class ViewCells:
     """Local view cells: C stored views of dimension D."""
@@ -177,6 +187,7 @@ class LocalizationEstimate:
     head_reliability: FloatArray  # (2,) 1/rad^2
     grid_phase_rad: FloatArray  # (M, 2 populations, 2 axes)
     grid_reliability: FloatArray  # (M, 2 populations, 2 axes) 1/rad^2
+    status: LocalizationStatus = LocalizationStatus.UNKNOWN  # why ``localized`` is what it is
 
 
 @dataclass(frozen=True, slots=True)

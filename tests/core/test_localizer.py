@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial import cKDTree
 
 from hippodrome.core import localizer_places as places_module
 from hippodrome.core import se2
@@ -14,7 +15,7 @@ from hippodrome.core.localizer_config import Injection
 from hippodrome.core.localizer_kalman import KalmanPose
 from hippodrome.core.localizer_motion import Motion
 from hippodrome.core.road_network import RoadNetwork
-from hippodrome.core.types import HippodromeError
+from hippodrome.core.types import HippodromeError, LocalizationStatus, Observation
 from tests.core.looped_world import Pictures, drive, loop_length, topometric_map
 
 PICTURES = Pictures(seed=3)
@@ -99,6 +100,46 @@ def test_leaving_the_mapped_road_is_reported_once_dead_reckoning_is_spent():
     assert not localized[int((0.95 * loop_length() - 137.0) / 0.8)]
 
 
+def test_off_the_map_is_said_while_dead_reckoning_still_knows_where():
+    part = topometric_map(PICTURES, np.random.default_rng(3), span_m=0.35 * loop_length())
+    estimates, _, _, _ = run(cognitive_map=part, length_m=350.0)
+    left = int((0.35 * loop_length() - 137.0) / 0.8)  # the step at which the mapped road ends
+    assert {estimate.status for estimate in estimates[100:left]} == {LocalizationStatus.LOCALIZED}
+    off = [estimate.status is LocalizationStatus.OFF_MAP for estimate in estimates]
+    assert left < np.argmax(off) < left + 50
+    assert all(off[left + 50 : left + 80])
+
+
+def test_standing_adds_no_doubt_and_no_uncertainty():
+    observations, _ = drive(PICTURES, np.random.default_rng(11), 137.0, 150.0)
+    other = PICTURES.frame(600.0, np.random.default_rng(0))  # a lorry pulls up: nothing of the street is seen any more
+    still = [Observation(observations[-1].t_s + 0.1 * k, 0.1, 0.0, 0.0, other) for k in range(1, 300)]
+    estimates = localize([*observations, *still], MAP, None, LocalizerConfig())[len(observations) - 1 :]
+    assert all(estimate.localized for estimate in estimates)
+    assert np.trace(estimates[-1].covariance[:2, :2]) < 1.5 * np.trace(estimates[0].covariance[:2, :2])
+
+
+@pytest.mark.parametrize("pose_type", [AttractorPose, KalmanPose])
+def test_an_outlier_in_the_same_place_neither_unseats_nor_drags_the_incumbent(pose_type):
+    localizer = Localizer(MAP, None, LocalizerConfig(mode="default" if pose_type is AttractorPose else "kalman"))
+    observations, truth = drive(PICTURES, np.random.default_rng(5), 137.0, 100.0)
+    for observation in observations:
+        before = localizer.step(observation)
+    off = Injection(truth[-1] + [9.0, 0.0, 0.5], np.diag([1.0, 0.25, 0.01]))
+    localizer._margin = 5.0
+    localizer._reactivate(off)
+    after = localizer._estimate(0.0)
+    assert before.localized and after.localized
+    assert np.linalg.norm(after.pose[:2] - before.pose[:2]) < 2.0
+
+
+def test_map_error_is_added_where_the_map_states_it():
+    sure = replace(MAP, covariance=np.tile(np.diag([0.01, 0.01, 1e-4]), (len(MAP.poses), 1, 1)))
+    vague = replace(MAP, covariance=np.tile(np.diag([4.0, 9.0, 0.01]), (len(MAP.poses), 1, 1)))
+    covariances = [run(cognitive_map=one, length_m=60.0)[0][-1].covariance for one in (sure, vague)]
+    assert_allclose(covariances[1] - covariances[0], np.diag([3.99, 8.99, 0.0099]), atol=1e-9)
+
+
 def test_paper_mode_follows_the_views_but_not_the_scale():
     _, _, localized, error_m = run("paper", metres_per_unit=2.0)
     settled = error_m[np.argmax(localized) + 100 :].mean()
@@ -178,7 +219,7 @@ def test_links_follow_the_street_and_never_the_opposite_lane():
         assert cell - 1 in sources
         assert cell + 1 not in sources
     opposite = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 3.2, np.pi], [0.0, 3.2, np.pi]])
-    start, source, _, _ = places_module._links(opposite)
+    start, source, _, _ = places_module._links(opposite, cKDTree(opposite[:, :2]))
     assert [list(source[start[j] : start[j + 1]]) for j in range(4)] == [[0], [0, 1], [2], [2, 3]]
 
 
@@ -216,7 +257,7 @@ def test_lane_pull_needs_a_single_lane_of_the_same_way():
 
     pose = np.array([[50.0, 0.6, 0.05]])
     single = network(lane(0.0, True), lane(3.2, False))
-    assert_allclose(places_module.centred(pose, single, 0.5), [[50.0, 0.3, 0.05]])
+    assert_allclose(places_module.centred(pose, single, np.array([0.5])), [[50.0, 0.3, 0.05]])
     double = network(lane(0.0, True), lane(3.2, True))
-    assert_allclose(places_module.centred(pose, double, 0.5), pose)
+    assert_allclose(places_module.centred(pose, double, np.array([0.5])), pose)
     assert_allclose(se2.wrap(pose[:, 2]), pose[:, 2])

@@ -20,6 +20,7 @@ from hippodrome.core.types import FloatArray
 MIN_CORNER_RAD: Final = np.deg2rad(50.0)  # streets leaving a crossing closer than this would overlap for many metres
 MAX_ARMS: Final = 4  # more streets at one crossing are rare and make star-shaped junctions
 GRID_JITTER: Final = 0.16  # of a block: enough that no two blocks look alike, too little to fold the grid
+MIN_CROSSINGS: Final = 2  # with fewer, there is no choice of way and the two driving directions never meet
 MISSING_BLOCKS: Final = 0.15  # share of streets left out of the grid and the rings
 CROSSING_REACH_M: Final = 10.0  # netconvert's junction areas reach this far into each arm, on average over the four kinds
 MAX_KINK_RAD: Final = np.deg2rad(20.0)  # SUMO, too, calls anything below this straight on
@@ -45,8 +46,13 @@ class Plan:
 
 
 def closest_plan(make: Callable[[int], Plan], sizes: Sequence[int], length_m: float) -> Plan:
-    """The plan of the size whose streets add up closest to ``length_m``."""
-    return min((make(size) for size in sizes), key=lambda plan: abs(plan.length_m() - length_m))
+    """The plan of the size whose streets add up closest to ``length_m``; one that is a town before one that is a mere ring."""
+    return min((make(size) for size in sizes), key=lambda plan: (_crossings(plan) < MIN_CROSSINGS, abs(plan.length_m() - length_m)))
+
+
+def _crossings(plan: Plan) -> int:
+    """Nodes where there is a choice of way."""
+    return int(np.count_nonzero(_arm_counts(len(plan.nodes_m), plan.streets) >= 3))
 
 
 def grid_plan(width_m: float, height_m: float, blocks: int, rng: np.random.Generator) -> Plan:

@@ -13,7 +13,7 @@ from hippodrome.sim.scenario import load_scenario
 SCENARIO = """\
 name: hamlet
 seed: 3
-town: {kind: random, width_m: 220, height_m: 220, road_km: 1.4}
+town: {kind: grid, width_m: 190, height_m: 190, road_km: 1.3}
 camera: {rate_hz: 5}
 mapping:
   tour: {length_m: 1500}

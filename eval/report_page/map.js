@@ -50,7 +50,7 @@ function startMap(root) {
     ...data.drives.map((path) => ({ name: `second drive in ${path.name}`, kind: "drive", path, colour: COLOURS[4], shown: false })),
   ];
   const bounds = truthBounds();
-  let view = null, hovered = null, chosen = null, waiting = false;
+  let view = null, fitted = true, size = [0, 0], hovered = null, chosen = null, waiting = false;
 
   function truthBounds() {
     const { x_m: xs, y_m: ys } = data.truth;
@@ -61,6 +61,7 @@ function startMap(root) {
 
   function fit() {
     const [x0, y0, x1, y1] = bounds, w = stage.clientWidth, h = stage.clientHeight;
+    fitted = true;
     const scale = 0.86 * Math.min(w / Math.max(x1 - x0, 1), h / Math.max(y1 - y0, 1));
     view = { scale, x: w / 2 - scale * (x0 + x1) / 2, y: h / 2 + scale * (y0 + y1) / 2 };
   }
@@ -89,10 +90,15 @@ function startMap(root) {
     } else if (layer.kind === "truth") {
       line(style.getPropertyValue("--truth"), 1.4, () => data.truth.t_s.forEach((_, i) => stroke(i, data.truth.x_m[i], data.truth.y_m[i])));
     } else if (layer.kind === "drive") {
-      dots(layer, 2.4, (i) => layer.path.localized[i] ? layer.colour : style.getPropertyValue("--soft"));
+      dots(layer, 0.85 * radius(), (i) => layer.path.localized[i] ? layer.colour : style.getPropertyValue("--soft"));
     } else {
-      dots(layer, 2.8, (i) => byError.checked && layer.path.error_m[i] !== null ? errorColour(layer.path.error_m[i]) : layer.colour);
+      dots(layer, radius(), (i) => byError.checked && layer.path.error_m[i] !== null ? errorColour(layer.path.error_m[i]) : layer.colour);
     }
+  }
+
+  /** Vertices lie some 5 m apart: dots that nearly touch, and can be told apart once zoomed in. */
+  function radius() {
+    return Math.min(Math.max(1.4 * view.scale, 1.6), 5);
   }
 
   function line(colour, width, path) {
@@ -108,12 +114,12 @@ function startMap(root) {
     if (i === 0) pen.moveTo(...screen(x, y)); else pen.lineTo(...screen(x, y));
   }
 
-  function dots(layer, radius, colour) {
+  function dots(layer, size, colour) {
     layer.path.t_s.forEach((_, i) => {
       const [x, y] = screen(layer.path.x_m[i], layer.path.y_m[i]);
       pen.fillStyle = colour(i);
       pen.beginPath();
-      pen.arc(x, y, radius, 0, 2 * Math.PI);
+      pen.arc(x, y, size, 0, 2 * Math.PI);
       pen.fill();
     });
   }
@@ -193,6 +199,7 @@ function startMap(root) {
   }
 
   function zoom(factor, x, y) {
+    fitted = false;
     view = { scale: view.scale * factor, x: x + (view.x - x) * factor, y: y + (view.y - y) * factor };
     redraw();
   }
@@ -240,7 +247,7 @@ function startMap(root) {
       if (!last) return hover(x, y);
       moved += Math.hypot(x - last[0], y - last[1]);
       if (down.size === 2) pinch(event.pointerId, [x, y]);
-      else if (moved > 4) { view.x += x - last[0]; view.y += y - last[1]; canvas.classList.add("dragging"); redraw(); }
+      else if (moved > 4) { fitted = false; view.x += x - last[0]; view.y += y - last[1]; canvas.classList.add("dragging"); redraw(); }
       down.set(event.pointerId, [x, y]);
     });
     function pinch(moving, now) {
@@ -269,6 +276,15 @@ function startMap(root) {
     });
   }
 
+  /** Show all again, or keep the middle of what the reader has moved to. */
+  function resize() {
+    const [w, h] = size;
+    size = [stage.clientWidth, stage.clientHeight];
+    if (fitted || !view) view = null;
+    else view = { ...view, x: view.x + (size[0] - w) / 2, y: view.y + (size[1] - h) / 2 };
+    redraw();
+  }
+
   function hover(x, y) {
     const spot = pick(x, y);
     tip.hidden = !spot;
@@ -282,7 +298,7 @@ function startMap(root) {
 
   setUpControls();
   setUpPointers();
-  new ResizeObserver(() => { view = null; redraw(); }).observe(stage);
+  new ResizeObserver(resize).observe(stage);
   dark.addEventListener("change", () => { colourBar(); redraw(); });
   root.dataset.ready = "yes";
 
@@ -293,6 +309,7 @@ function startMap(root) {
     layer.shown = layer.input.checked = true;
     go(i, layer);
     if (!view) fit();
+    fitted = false;
     const wanted = Math.max(view.scale, 4); // px a metre: a street fills the map
     view = { scale: wanted, x: stage.clientWidth / 2 - wanted * layer.path.x_m[i], y: stage.clientHeight / 2 + wanted * layer.path.y_m[i] };
     root.scrollIntoView({ block: "center" });

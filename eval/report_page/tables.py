@@ -11,6 +11,7 @@ from hippodrome.eval.tables import (
     LOCALIZATION_COLUMNS,
     MAPPING_COLUMNS,
     NONE,
+    QUOTED_MARK,
     QUOTED_NOTE,
     Column,
     filled_columns,
@@ -36,20 +37,20 @@ def overview(results: Results, quoted: Sequence[Row]) -> Html:
     """One line a scenario: APE of every method, and how the second drive was localized; the paper's figures below."""
     measured = list(dict.fromkeys(row.method for scenario in results.scenarios for row in scenario.rows))
     localizing = [method for method in measured if any(_located(_row(one, method)) for one in results.scenarios)]
-    heads = ["Scenario", "Road (km)", "Drive (s)", "Frames"]
-    heads += [f"APE (m), {method}" for method in measured] + [f"Localization (m), {method}" for method in localizing]
+    heads = ["Scenario", *(f"APE (m), {method}" for method in measured)]
+    heads += [*(f"Localization (m), {method}" for method in localizing), "Road (km)", "Drive (s)", "Frames"]
     rows: list[Sequence[Child]] = [
         [
             element("a", scenario.name, href=f"#{anchor(place)}"),
+            *(_ape(_row(scenario, method)) for method in measured),
+            *(_location_error(_row(scenario, method)) for method in localizing),
             f"{scenario.network.km:.1f}",
             f"{scenario.duration_s:,.0f}",
             f"{scenario.frames:,}",
-            *(_ape(_row(scenario, method)) for method in measured),
-            *(_location_error(_row(scenario, method)) for method in localizing),
         ]
         for place, scenario in enumerate(results.scenarios)
     ]
-    note = element("p", f"The paper's own: {_paper_line(quoted)}. {QUOTED_NOTE}", class_="note") if quoted else None
+    note = element("p", f"The paper's APE: {_paper_line(quoted)} ({QUOTED_NOTE}).", class_="note") if quoted else None
     return Html(plain_table(heads, rows, "all scenarios") + (note or ""))
 
 
@@ -82,7 +83,9 @@ def _worst_of(layer: Layer, evidence: MapEvidence, with_frames: bool) -> Html:
 
 def _worst_card(layer: Layer, vertex: int, evidence: MapEvidence, with_frames: bool) -> Html:
     t_s, error_m = layer.t_s[vertex], layer.error_m[vertex] or 0.0
-    words = joined(element("strong", f"{error_m:.2f}\N{NO-BREAK SPACE}m"), element("small", f"vertex {vertex}, {t_s:.0f} s"))
+    words = joined(
+        element("strong", f"{error_m:.2f}\N{NO-BREAK SPACE}m"), element("small", f"vertex {vertex}, {t_s:.0f}\N{NO-BREAK SPACE}s")
+    )
     return element("button", frame_tile(evidence, t_s) if with_frames else None, words, type="button", class_="goto card",
                    data_method=layer.name, data_vertex=vertex, title="Show on the map")  # fmt: skip
 
@@ -143,4 +146,4 @@ def _location_error(row: Row | None) -> Child:
 
 
 def _paper_line(quoted: Sequence[Row]) -> str:
-    return "; ".join(f"{row.method} {row.ape.mean_m:g} m" for row in quoted if row.ape is not None)
+    return "; ".join(f"{row.method} {QUOTED_MARK} {row.ape.mean_m:g} m" for row in quoted if row.ape is not None)

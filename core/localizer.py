@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from hippodrome.core import localizer_places, view_cells, view_step
+from hippodrome.core import localizer_places, view_cells, view_search, view_step
 from hippodrome.core.localizer_attractor import AttractorPose
 from hippodrome.core.localizer_config import Injection, LocalizerConfig
 from hippodrome.core.localizer_kalman import KalmanPose
@@ -22,7 +22,6 @@ from hippodrome.core.localizer_motion import Motion
 from hippodrome.core.localizer_paper import PaperPose
 from hippodrome.core.localizer_places import is_same_place
 from hippodrome.core.road_network import RoadNetwork
-from hippodrome.core.sequence_filter import standardise
 from hippodrome.core.types import (
     CognitiveMap,
     Float32Array,
@@ -33,6 +32,7 @@ from hippodrome.core.types import (
     LocalizationStatus,
     Observation,
 )
+from hippodrome.core.view_search import Found
 
 __all__ = ["Localizer", "LocalizerConfig", "localize"]
 
@@ -59,6 +59,7 @@ class Localizer:
         self._config = config
         self._places = localizer_places.places_of(cognitive_map, network, config.lane_sigma_m, config.injection.map_m)
         self._belief = _unknown(cognitive_map, config)
+        self._index = view_search.index_of(self._places.bank, config.search)
         self._filtered: Float32Array = np.zeros(len(self._places.poses_m), dtype=np.float32)
         self._query_mean = view_cells.start_query_mean(self._places.bank.mean, config.mean_trust)
         self._view_step = view_step.start()
@@ -88,24 +89,28 @@ class Localizer:
         config, places = self._config, self._places
         descriptor = view_cells.describe(frame, config.views)
         self._query_mean = view_cells.update_query_mean(self._query_mean, descriptor, config.views)
-        scores = view_cells.score(places.bank, descriptor, self._query_mean, config.views)
-        similarity: Float32Array = scores.max(axis=1)  # over the sideways shifts
-        self._filtered = self._filter(similarity)
+        expected = localizer_places.expected(places, self._filtered, config.search.hypotheses)
+        query = descriptor, self._query_mean
+        found = view_search.search(places.bank, self._index, expected, query, config.views, config.search)
+        self._filtered = self._filter(found)
         self._cell = int(np.argmax(self._filtered))
         self._margin = localizer_places.margin(places, self._filtered, self._cell)
         self._view_step = view_step.restart(self._view_step)
         self._step_m, self._turned_rad = 0.0, 0.0
         self._support, self._challenge = config.evidence_memory * self._support, config.evidence_memory * self._challenge
         if self._margin >= config.margin and places.usable[self._cell]:
-            self._reactivate(self._injection(similarity))
+            self._reactivate(self._injection(found))
         self._mapped = localizer_places.is_mapped(places, self._belief.pose, _sigma_m(self._belief.covariance))
 
-    def _filter(self, similarity: Float32Array) -> Float32Array:
+    def _filter(self, found: Found) -> Float32Array:
         sequence, places = self._config.sequence, self._places
         floor = sequence.sigma_floor if places.bank.kind == "gradient" else sequence.grey_sigma_floor
+        enough = len(places.poses_m) >= sequence.min_cells
+        z = (found.similarity - found.mean) / max(found.spread, floor) if enough else np.zeros_like(found.similarity)
         filtered: Float32Array = localizer_places.propagate(
             self._filtered,
-            standardise(similarity, sequence.min_cells, floor),
+            found.cells,
+            z.astype(np.float32),
             (places.link_start, places.link_from, places.link_length_m, places.link_turn_rad),
             (self._step_m, self._turned_rad),
             (self._config.step_tolerance_m, sequence.turn_tolerance_rad),
@@ -113,7 +118,9 @@ class Localizer:
         )
         return filtered
 
-    def _injection(self, similarity: Float32Array) -> Injection:
+    def _injection(self, found: Found) -> Injection:
+        similarity = np.full(len(self._places.poses_m), np.nan, dtype=np.float32)
+        similarity[found.cells] = found.similarity
         noise = self._config.injection
         pose = localizer_places.interpolated_pose(self._places, similarity, self._cell)
         cos, sin = np.cos(pose[2]), np.sin(pose[2])

@@ -10,6 +10,7 @@ from hippodrome.core.grid_cells import GRID_INFORMATION
 from hippodrome.core.sequence_filter import SequenceConfig
 from hippodrome.core.types import FloatArray
 from hippodrome.core.view_cells import ViewCellConfig
+from hippodrome.core.view_search import SearchConfig
 from hippodrome.core.view_step import ViewStepConfig
 
 
@@ -63,6 +64,7 @@ class LocalizerConfig:
 
     mode: Literal["default", "paper", "kalman"] = "default"
     views: ViewCellConfig = field(default_factory=ViewCellConfig)
+    search: SearchConfig = field(default_factory=SearchConfig)
     steps: ViewStepConfig = field(default_factory=lambda: ViewStepConfig(interval_s=0.4))  # denser than the map: 15 % less error
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
     motion: MotionNoise = field(default_factory=MotionNoise)

@@ -43,6 +43,8 @@ class Places:
     link_from: IntArray  # (K,)
     link_length_m: FloatArray  # (K,)
     link_turn_rad: FloatArray  # (K,)
+    onward_start: IntArray  # (C + 1,) the same links from their source: cell ``i`` leads to ``onward[start[i]:start[i + 1]]``
+    onward: IntArray  # (K,)
 
 
 def places_of(cognitive_map: CognitiveMap, network: RoadNetwork | None, lane_sigma_m: float, map_sigma_m: float) -> Places:
@@ -57,7 +59,9 @@ def places_of(cognitive_map: CognitiveMap, network: RoadNetwork | None, lane_sig
     usable = np.ones(cells, dtype=np.bool_) if match is None else match.status[vertex] == MatchStatus.MATCHED
     before, after = _neighbours(vertex, cognitive_map, poses)
     tree = cKDTree(poses[:, :2])
-    return Places(bank_of(cognitive_map.view_cells), poses, sq_map, tree, usable, before, after, *_links(poses, tree))
+    links = _links(poses, tree)
+    bank, onward = bank_of(cognitive_map.view_cells), _onward(*links[:2])
+    return Places(bank, poses, sq_map, tree, usable, before, after, *links, *onward)
 
 
 def _map_covariance(cognitive_map: CognitiveMap, vertex: IntArray, sigma_m: float) -> FloatArray:
@@ -127,9 +131,26 @@ def _links(poses: FloatArray, tree: cKDTree) -> tuple[IntArray, IntArray, FloatA
     return start.astype(np.int32), source[order].astype(np.int32), length[order], turn[order]
 
 
+def _onward(start: IntArray, source: IntArray) -> tuple[IntArray, IntArray]:
+    """The links in the order of their sources."""
+    target = np.repeat(np.arange(len(start) - 1, dtype=np.int32), np.diff(start))
+    order = np.argsort(source, kind="stable")
+    onward_start = np.searchsorted(source[order], np.arange(len(start))).astype(np.int32)
+    return onward_start, target[order]
+
+
+def expected(places: Places, filtered: Float32Array, hypotheses: int) -> IntArray:
+    """Cells that the best ``hypotheses`` cells of the look before lead to, with repetitions."""
+    likely = np.flatnonzero(filtered > 0.0)
+    if len(likely) > hypotheses:
+        likely = likely[np.argpartition(-filtered[likely], hypotheses)[:hypotheses]]
+    return np.concatenate([np.zeros(0, dtype=np.int32), *(places.onward[slice(*places.onward_start[i : i + 2])] for i in likely)])
+
+
 @njit(cache=True)
 def propagate(
     before: Float32Array,
+    cells: IntArray,
     z: Float32Array,
     links: tuple[IntArray, IntArray, FloatArray, FloatArray],
     step: tuple[float, float],
@@ -138,17 +159,18 @@ def propagate(
 ) -> Float32Array:
     """Sequence evidence (C,): F_t(j) = (1 - memory) z_t(j) + memory max(0, max F_{t-1}(i) over the i that lead to j).
 
-    ``step`` and ``tolerance``: length in m and turn in rad, of the motion since the last look.
+    ``z`` (K,) belongs to ``cells``; the others have no evidence. ``step`` and ``tolerance``: length in m and turn in rad, of the
+    motion since the last look.
     """
     start, source, length, turn = links
-    filtered = np.empty_like(z)
-    for j in range(len(z)):
-        best = np.float32(0.0)
+    filtered = np.zeros_like(before)
+    for n in range(len(cells)):
+        j, best = cells[n], np.float32(0.0)
         for k in range(start[j], start[j + 1]):
             fits = abs(length[k] - step[0]) <= tolerance[0] and abs(turn[k] - step[1]) <= tolerance[1]
             if fits and before[source[k]] > best:
                 best = before[source[k]]
-        filtered[j] = (np.float32(1.0) - memory) * z[j] + memory * best
+        filtered[j] = (np.float32(1.0) - memory) * z[n] + memory * best
     return filtered
 
 
@@ -169,10 +191,13 @@ def _best_elsewhere(poses_m: FloatArray, filtered: Float32Array, best: int) -> f
 
 
 def interpolated_pose(places: Places, similarity: Float32Array, cell: int) -> FloatArray:
-    """Pose (3,) between views: the peak of the parabola through the similarity of a cell and its two neighbours."""
+    """Pose (3,) between views: the peak of the parabola through the similarity of a cell and its two neighbours.
+
+    ``similarity`` (C,) is nan where it was not looked at.
+    """
     before, after = places.before[cell], places.after[cell]
     own: FloatArray = places.poses_m[cell]
-    if before < 0 or after < 0:
+    if before < 0 or after < 0 or np.isnan(similarity[before] + similarity[after]):
         return own
     back_m = math.dist(own[:2], places.poses_m[before, :2])
     ahead_m = math.dist(own[:2], places.poses_m[after, :2])

@@ -203,7 +203,7 @@ def score(bank: ViewCellBank, descriptor: Descriptor, query_mean: QueryMean, con
     if bank.kind == "grey":
         grey: Float32Array = _negative_absolute_difference(bank.templates, descriptor, config.max_shift, bank.shape[1])
         return grey
-    queries = _shifted_queries(descriptor - query_mean.mean, bank.shape, config.max_shift)
+    queries = shifted_queries(descriptor - query_mean.mean, bank.shape, config.max_shift)
     scale = QUERY_SCALE / np.maximum(np.abs(queries).max(), 1e-6)
     whole = np.rint(queries * scale).astype(np.int16)
     offset = (whole @ bank.mean) / scale
@@ -218,7 +218,7 @@ def best_over_shifts(scores: Float32Array, max_shift: int) -> tuple[Float32Array
     return scores[np.arange(len(scores)), column], (column - max_shift).astype(np.int32)
 
 
-def _shifted_queries(query: Float32Array, shape: tuple[int, ...], max_shift: int) -> Float32Array:
+def shifted_queries(query: Float32Array, shape: tuple[int, ...], max_shift: int) -> Float32Array:
     """Unit-length copies (2 max_shift + 1, D) of a mean-free query, moved sideways; the columns that open up are the mean."""
     image, columns = query.reshape(shape), shape[0]
     moved = np.zeros((2 * max_shift + 1, *shape), dtype=np.float32)

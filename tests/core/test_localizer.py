@@ -16,6 +16,7 @@ from hippodrome.core.localizer_kalman import KalmanPose
 from hippodrome.core.localizer_motion import Motion
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import HippodromeError, LocalizationStatus, Observation
+from hippodrome.core.view_search import SearchConfig
 from tests.core.looped_world import Pictures, drive, loop_length, topometric_map
 
 PICTURES = Pictures(seed=3)
@@ -225,11 +226,36 @@ def test_links_follow_the_street_and_never_the_opposite_lane():
 
 def test_evidence_runs_along_links_only():
     links = (np.array([0, 1, 3]), np.array([0, 0, 1]), np.array([0.0, 5.0, 0.0]), np.zeros(3))
-    before, z = np.array([2.0, 0.0], np.float32), np.array([0.5, 1.0], np.float32)
-    moved = places_module.propagate(before, z, links, (5.0, 0.0), (3.0, 0.5), np.float32(0.5))
+    before, z, cells = np.array([2.0, 0.0], np.float32), np.array([0.5, 1.0], np.float32), np.arange(2, dtype=np.int32)
+    moved = places_module.propagate(before, cells, z, links, (5.0, 0.0), (3.0, 0.5), np.float32(0.5))
     assert_allclose(moved, [0.25, 1.5])
-    turned = places_module.propagate(before, z, links, (5.0, 1.0), (3.0, 0.5), np.float32(0.5))
+    turned = places_module.propagate(before, cells, z, links, (5.0, 1.0), (3.0, 0.5), np.float32(0.5))
     assert_allclose(turned, [0.25, 0.5])
+    second = places_module.propagate(before, cells[1:], z[1:], links, (5.0, 0.0), (3.0, 0.5), np.float32(0.5))
+    assert_allclose(second, [0.0, 1.5])
+
+
+def test_expected_cells_are_those_that_the_best_lead_to():
+    places = places_module.places_of(MAP, None, 0.0, 0.4)
+    filtered = np.zeros(len(places.poses_m), np.float32)
+    filtered[[20, 50]] = [2.0, 1.0]
+    near = places_module.expected(places, filtered, 1)
+    assert set(near) == {
+        j for j in range(len(filtered)) if 20 in places.link_from[places.link_start[j] : places.link_start[j + 1]]
+    }
+    assert 51 in places_module.expected(places, filtered, 2)
+    assert len(places_module.expected(places, np.zeros_like(filtered), 1)) == 0
+
+
+def test_the_sketched_search_localizes_like_the_exhaustive_one(default_run):
+    observations, _ = drive(PICTURES, np.random.default_rng(11), 137.0, 700.0, metres_per_unit=2.5)
+    sketched = LocalizerConfig(search=SearchConfig(exhaustive_cells=50, candidates=12, hypotheses=8, sketch_size=48))
+    estimates = localize(observations, MAP, None, sketched)
+    exhaustive = default_run[0]
+    apart_m = [np.linalg.norm(a.pose[:2] - b.pose[:2]) for a, b in zip(estimates, exhaustive, strict=True) if b.localized]
+    assert np.mean([estimate.localized for estimate in estimates]) > np.mean([one.localized for one in exhaustive]) - 0.02
+    assert np.median(apart_m) < 0.1
+    assert np.max(apart_m) < 3.0
 
 
 def test_lane_pull_needs_a_single_lane_of_the_same_way():

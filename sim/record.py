@@ -110,13 +110,18 @@ def prepare(plan: RecordingPlan) -> list[int]:
     return [chunk for chunk in range(chunk_count(samples)) if not chunk_path(folder, chunk).exists()]
 
 
-def _simulate(plan: RecordingPlan, folder: Path) -> None:
+def simulate(plan: RecordingPlan) -> tuple[Drive, Samples]:
+    """The plan's drive, and what is sensed on it, without frames. Nothing is written but a town that has to be generated."""
     scenario, town, noise = plan.scenario, plan.town(), plan.scenario.self_motion_noise
     spec = plan.drive_spec
     ego = spec.ego.model_copy(update={"lateral_wander_m": max(spec.ego.lateral_wander_m, noise.lateral_wander_m)})
     drive = simulate_drive(town, spec.tour, spec.traffic, ego, plan.seed)
     motion = sense_self_motion(drive, scenario.odometry_rate_hz, noise, np.random.default_rng([plan.seed, 1]))
-    samples = sample_drive(drive, town.network, motion, camera_divider(scenario.camera, scenario.odometry_rate_hz))
+    return drive, sample_drive(drive, town.network, motion, camera_divider(scenario.camera, scenario.odometry_rate_hz))
+
+
+def _simulate(plan: RecordingPlan, folder: Path) -> None:
+    drive, samples = simulate(plan)
     _write_drive(folder / "drive.npz", drive)
     write_arrays(folder / "samples.npz", {field.name: np.asarray(getattr(samples, field.name)) for field in fields(samples)})
 

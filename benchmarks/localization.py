@@ -1,7 +1,8 @@
 """Localization: a step with a frame to look at, a step without, and one tick of the attractor networks.
 
-Views are random, one every 5 m of a street that winds to and fro; scoring takes the same time for any content. Process CPU
-time, medians.
+Views lie 5 m apart along a street that winds to and fro; each blends two described pictures of boxes, so that they differ in
+about as few directions as a town's. Recall is that of the sketched search: how often it scores the cell that the exhaustive one
+finds best, for stored views seen again with noise. Process CPU time, medians.
 """
 
 from __future__ import annotations
@@ -16,17 +17,21 @@ from hippodrome.core import grid_cells, head_direction
 from hippodrome.core.attractor import AttractorConfig
 from hippodrome.core.localizer import Localizer, LocalizerConfig
 from hippodrome.core.types import AttractorStates, CognitiveMap, Edges, Frame, Observation, ViewCells, Visits
-from hippodrome.core.view_cells import ViewCellConfig, template_mean
+from hippodrome.core.view_cells import ViewCellConfig, bank_of, describe, start_query_mean, template_mean
+from hippodrome.core.view_search import SearchConfig, index_of, search
 
 BANKS = (1_400, 10_000, 100_000)
 SPACING_M, ROW_M, ROWS_APART_M = 5.0, 2_000.0, 30.0
 LOOKS, TICKS = 40, 2_000
+PICTURES = 1_000  # described ones that the views are blended from
+NOISE = 12.0  # of a descriptor seen again: about what another sun makes of it
+NO_CELLS = np.zeros(0, dtype=np.int32)
 
 
 def run() -> list[Row]:
     rows = [_attractor_tick()]
     for views in BANKS:
-        rows += _localizer_steps(views)
+        rows += _localizer_steps(views) + _searches(views)
     return rows
 
 
@@ -53,6 +58,7 @@ def _localizer_steps(views: int) -> list[Row]:
     localizer = Localizer(_winding_map(views, rng), None, LocalizerConfig())
     frames = rng.integers(0, 256, (LOOKS, 120, 160), dtype=np.uint8)
     number = iter(range(10**9))
+    kind = "exhaustive" if views <= SearchConfig().exhaustive_cells else "sketched"
 
     def observe(frame: Frame | None) -> None:
         localizer.step(Observation(0.6 * (next(number) + 1), 0.6, 4.0, 0.0, frame))  # one view step: each frame is looked at
@@ -61,8 +67,34 @@ def _localizer_steps(views: int) -> list[Row]:
     looks = [_median_s(lambda frame=frame: observe(frame), 1) for frame in frames]  # type: ignore[misc]
     blind = _median_s(lambda: observe(None), 200)
     return [
-        Row("localization", f"step with a look, {views} views", 1e3 * float(np.median(looks)), "ms", "exhaustive scoring"),
+        Row("localization", f"step with a look, {views} views", 1e3 * float(np.median(looks)), "ms", f"{kind} search"),
         Row("localization", f"step without, {views} views", 1e3 * blind, "ms"),
+    ]
+
+
+def _searches(views: int) -> list[Row]:
+    """Time, memory and recall of the sketched search beside the exhaustive one."""
+    rng, config, cells = np.random.default_rng(views), SearchConfig(), ViewCellConfig()
+    bank = bank_of(_winding_map(views, rng).view_cells)
+    index = index_of(bank, config)
+    if index is None:
+        return []
+    spent_s, found = np.zeros((LOOKS, 2)), 0
+    for look, cell in enumerate(rng.integers(0, views, LOOKS)):
+        seen = bank.templates[cell] + rng.normal(0.0, NOISE, bank.templates.shape[1])
+        query = np.clip(seen, 0, 127).astype(np.int8), start_query_mean(bank.mean)
+        began = time.process_time()
+        everything = search(bank, None, NO_CELLS, query, cells, config)
+        between = time.process_time()
+        some = search(bank, index, NO_CELLS, query, cells, config)
+        spent_s[look] = between - began, time.process_time() - between
+        found += int(np.argmax(everything.similarity)) in some.cells
+    exhaustive_ms, sketched_ms = 1e3 * np.median(spent_s, axis=0)
+    stored = bank.templates.shape[1]
+    return [
+        Row("localization", f"exhaustive search, {views} views", exhaustive_ms, "ms", f"{stored} bytes/view"),
+        Row("localization", f"sketched search, {views} views", sketched_ms, "ms", f"{stored + index.sketch.shape[1]} bytes/view"),
+        Row("localization", f"sketched recall, {views} views", 100.0 * found / LOOKS, "%", "of its best cell"),
     ]
 
 
@@ -83,7 +115,9 @@ def _winding_map(views: int, rng: np.random.Generator) -> CognitiveMap:
     backwards = row % 2 == 1
     x_m, heading = np.where(backwards, ROW_M - within, within), np.where(backwards, np.pi, 0.0)
     config, index = ViewCellConfig(), np.arange(views, dtype=np.int32)
-    templates = rng.integers(0, 60, (views, int(np.prod(config.shape))), dtype=np.int8)
+    pictures = np.array([describe(_boxes(rng), config) for _ in range(PICTURES)], dtype=np.float32)
+    (one, other), share = rng.integers(0, PICTURES, (2, views)), rng.uniform(0.2, 0.8, (views, 1)).astype(np.float32)
+    templates = np.rint(share * pictures[one] + (1.0 - share) * pictures[other]).astype(np.int8)
     motion = np.tile([SPACING_M, 0.0, 0.0], (views, 1))
     return CognitiveMap(
         frame="network",
@@ -102,3 +136,11 @@ def _winding_map(views: int, rng: np.random.Generator) -> CognitiveMap:
         ),
         log_scale=np.zeros(views),
     )
+
+
+def _boxes(rng: np.random.Generator) -> Frame:
+    """A picture (120, 160) of 25 boxes on a plain ground."""
+    picture = np.full((120, 160), 128, dtype=np.uint8)
+    for x, y, width, height, grey in rng.integers([0, 0, 5, 5, 0], [150, 110, 60, 60, 256], (25, 5)):
+        picture[y : y + height, x : x + width] = grey
+    return picture

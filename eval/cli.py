@@ -9,11 +9,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hippodrome.core.types import HippodromeError, StartPose
+from hippodrome.eval.authoring.command import add_scenario_command
 
 DONE, THRESHOLD_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 EPILOG = """\
 examples:
+  hippodrome scenario new my-town --from my_town.net.xml
   hippodrome eval scenarios/towns/rural.yaml --out out/rural
   hippodrome eval scenarios/paper.yaml --network my_town.net.xml --seed 7
   hippodrome render scenarios/towns/grid.yaml --out out/grid
@@ -55,6 +57,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     evaluate.add_argument("--out", type=Path, default=Path("out/eval"), metavar="DIR", help="results go here (default: out/eval)")
     evaluate.set_defaults(command=_evaluate)
+
+    add_scenario_command(commands)
 
     render = commands.add_parser("render", help="make the recordings of a scenario only", description=_render.__doc__)
     _scenario_options(render, several=False)

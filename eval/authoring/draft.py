@@ -1,0 +1,162 @@
+"""``hippodrome scenario new``: a commented scenario with values that suit its road network."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import yaml
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.proto.atomic import write_atomically
+from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.tour import tour_graph
+from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.types import Town
+from hippodrome.sim.yaml_file import ScenarioError, load_yaml
+
+KINDS: Final = ("rural", "grid", "radial", "random")
+TOUR_SHARE = 1.3  # of the drivable roads: all of them once, and 40 % of the drive on roads seen before
+TOUR_M = (1500.0, 7200.0)  # shorter drives close too few loops; the upper end is the paper's drive
+LOCALIZATION_SHARE = 1 / 3  # of the mapping tour
+LOCALIZATION_M = (500.0, 1800.0)  # the upper end is the paper's long test drive
+VEHICLES_PER_KM = 3.0  # of the toured roads: one in sight most of the time, no queues
+FAST_MPS = 15.0  # beyond, 5 Hz leave more than 3 m between views
+ROUND_TO_M = 100.0
+
+TEMPLATE = """\
+# {title}
+# Try it:    hippodrome scenario preview {file}
+# Score it:  hippodrome eval {file}
+# Every key: docs/scenarios.md; a key left out has the default given there.
+name: {name}
+seed: 1  # of the generated town, the routes, the traffic and the noise
+{town}
+camera: {{rate_hz: {rate_hz:g}}}  # frames a second; odometry_rate_hz (10) must be a whole multiple of it
+noise: paper  # of the self-motion: clean, paper, realistic or harsh
+mapping:  # the drive that the map is built from
+  tour: {{length_m: {tour_m:.0f}}}  # {tour_words}
+  traffic: {{vehicles: {vehicles}}}  # on the road at the same time
+localization:  # a second drive, on another route and among other traffic, that is localized in the map
+  tour: {{length_m: {second_m:.0f}}}
+  traffic: {{vehicles: {second_vehicles}}}
+  conditions: {{sun_azimuth_deg: 120, sun_elevation_deg: 35}}  # the mapping drive has 210 and 45; also: overcast, dusk, season
+thresholds:  # hippodrome eval exits with 1 where one of them does not hold
+  method: topometric
+  ape_mean_m: 5.0
+  localization_success: true
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """What the network suggests."""
+
+    tour_m: float
+    second_m: float
+    vehicles: int
+    rate_hz: float
+    drivable_km: float
+    notes: tuple[str, ...]
+
+
+def new_scenario(name: str, source: str, path: Path) -> Draft:
+    """Write a scenario for a kind of town or a network file to ``path``. Raises HippodromeError, also if ``path`` exists."""
+    if path.exists():
+        raise HippodromeError(f"{path}: exists already; choose another --out, or remove it first")
+    spec = _town_spec(source)
+    with tempfile.TemporaryDirectory() as folder:
+        draft = draft_for(build_town(spec, 1, Path(folder)))
+        text = scenario_text(name, source, path, draft)
+        trial = Path(folder) / path.name
+        trial.write_text(text, encoding="utf-8")
+        _check(trial, path)
+    write_atomically(path, text.encode())
+    return draft
+
+
+def draft_for(town: Town) -> Draft:
+    """Lengths from the size of the part of the network that can be toured, rates from its speed limits."""
+    network = town.network
+    graph = tour_graph(network)
+    drivable_m = float(graph.length_m.sum())
+    tour_m = _rounded(float(np.clip(TOUR_SHARE * drivable_m, *TOUR_M)))
+    toured_km = min(drivable_m, tour_m) / 1e3
+    vehicles = max(2, round(VEHICLES_PER_KM * toured_km))
+    fast = float(np.median(network.speed_limit_mps[~network.is_internal])) > FAST_MPS
+    return Draft(
+        tour_m=tour_m,
+        second_m=_rounded(float(np.clip(LOCALIZATION_SHARE * tour_m, *LOCALIZATION_M))),
+        vehicles=vehicles,
+        rate_hz=10.0 if fast else 5.0,
+        drivable_km=drivable_m / 1e3,
+        notes=town.notes,
+    )
+
+
+def scenario_text(name: str, source: str, path: Path, draft: Draft) -> str:
+    """The file's text."""
+    generated = source in KINDS
+    return TEMPLATE.format(
+        title=f"A generated town, {source}." if generated else f"The roads of {Path(source).name}.",
+        file=path,
+        name=_scalar(name),
+        town=f"town: {_flow(_shipped_town(source))}" if generated else f"town: {{network: {_scalar(_relative(source, path))}}}",
+        rate_hz=draft.rate_hz,
+        tour_m=draft.tour_m,
+        tour_words=_tour_words(draft),
+        vehicles=draft.vehicles,
+        second_m=draft.second_m,
+        second_vehicles=round(1.5 * draft.vehicles),
+    )
+
+
+def _tour_words(draft: Draft) -> str:
+    share = min(1.0, 0.6 * draft.tour_m / (1e3 * draft.drivable_km))
+    return f"40 % of it on roads driven before; of the {draft.drivable_km:.1f} km that can be driven it sees about {share:.0%}"
+
+
+def _town_spec(source: str) -> TownSpec:
+    if source in KINDS:
+        return TownSpec.model_validate(_shipped_town(source))
+    if not Path(source).is_file():
+        raise HippodromeError(f"--from {source}: neither a kind of town ({', '.join(KINDS)}) nor a file")
+    return TownSpec(network=Path(source).resolve())
+
+
+def _shipped_town(kind: str) -> dict[str, object]:
+    """The town of the scenario that comes with the package: one place where the sizes are chosen."""
+    text = (files("hippodrome.scenarios") / "towns" / f"{kind}.yaml").read_text(encoding="utf-8")
+    town: dict[str, object] = yaml.safe_load(text)["town"]
+    return town
+
+
+def _relative(source: str, path: Path) -> str:
+    """The network as seen from the scenario's folder, so that both can move together."""
+    return Path(os.path.relpath(Path(source).resolve(), path.resolve().parent)).as_posix()
+
+
+def _scalar(text: str) -> str:
+    """A string as YAML writes it: quoted where it has to be."""
+    return yaml.safe_dump(text, default_style=None, width=1000).removesuffix("...\n").strip()
+
+
+def _flow(values: dict[str, object]) -> str:
+    return yaml.safe_dump(values, default_flow_style=True, sort_keys=False, width=1000).strip()
+
+
+def _check(trial: Path, path: Path) -> None:
+    """What is written must load; only the name can be wrong."""
+    try:
+        load_yaml(trial, Scenario)
+    except ScenarioError as error:
+        raise ScenarioError(str(error).replace(str(trial), str(path))) from None
+
+
+def _rounded(length_m: float) -> float:
+    return ROUND_TO_M * round(length_m / ROUND_TO_M)

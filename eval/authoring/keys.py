@@ -1,0 +1,113 @@
+"""Every key of a scenario with its meaning, read from the models themselves: each is declared, and explained, in one place."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import io
+import tokenize
+import typing
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel
+
+from hippodrome.sim.scenario import Scenario
+
+SIGNS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Key:
+    """One key: its path in the file, what it takes, what it is without being set, and what it means."""
+
+    path: tuple[str, ...]
+    kind: str
+    default: Any
+    limits: str
+    meaning: str
+
+    @property
+    def name(self) -> str:
+        return ".".join(self.path)
+
+
+@lru_cache(maxsize=1)
+def scenario_keys() -> tuple[Key, ...]:
+    """All keys that hold values, in the order of the models."""
+    defaults = Scenario(name="name").model_dump(mode="json")
+    return tuple(_keys(Scenario, (), defaults))
+
+
+def is_model(kind: Any) -> bool:
+    """Whether a type has keys of its own."""
+    return isinstance(kind, type) and (issubclass(kind, BaseModel) or dataclasses.is_dataclass(kind))
+
+
+@lru_cache(maxsize=256)
+def comments(model: type) -> dict[str, str]:
+    """What each field's comment says: the text after ``#`` on the lines of its declaration."""
+    lines, first = inspect.getsourcelines(model)
+    source = inspect.cleandoc("".join(lines)) if lines[0].startswith(" ") else "".join(lines)
+    words: dict[int, str] = {}
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            words[token.start[0]] = token.string.lstrip("# ").removeprefix("fmt: skip").strip()
+    (body,) = ast.parse(source).body
+    assert isinstance(body, ast.ClassDef), f"{model} at line {first}"
+    fields = [node for node in body.body if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)]
+    return {
+        node.target.id: " ".join(filter(None, (words.get(line) for line in range(node.lineno, (node.end_lineno or 0) + 1))))
+        for node in fields
+        if isinstance(node.target, ast.Name)
+    }
+
+
+def fields_of(model: type) -> Iterator[tuple[str, Any, tuple[Any, ...]]]:
+    """Name, type and constraints of each field."""
+    if issubclass(model, BaseModel):
+        for name, info in model.model_fields.items():
+            yield name, info.annotation, (*info.metadata, *_inner_constraints(info.annotation))
+    else:
+        hints = typing.get_type_hints(model)
+        for field in dataclasses.fields(model):  # type: ignore[arg-type]
+            yield field.name, hints[field.name], ()
+
+
+def _keys(model: type, path: tuple[str, ...], defaults: Any) -> Iterator[Key]:
+    meanings = comments(model)
+    for name, annotation, constraints in fields_of(model):
+        default = defaults.get(name) if isinstance(defaults, dict) else None
+        if is_model(annotation):
+            yield from _keys(annotation, (*path, name), default)
+        else:
+            yield Key((*path, name), _kind(annotation), default, _limits(constraints), meanings.get(name, ""))
+
+
+def _inner_constraints(annotation: Any) -> tuple[Any, ...]:
+    """Of ``Annotated[float, Field(gt=0)] | None``: the constraints sit inside."""
+    inside = (getattr(part, "__metadata__", ()) for part in get_args(annotation))
+    infos = [info for metadata in inside for info in metadata]
+    return tuple(rule for info in infos for rule in getattr(info, "metadata", (info,)))
+
+
+def _kind(annotation: Any) -> str:
+    """A type in words."""
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        return " or ".join(str(part) for part in parts)
+    if origin is typing.Annotated:
+        return _kind(parts[0])
+    if origin in (tuple, list):
+        return f"list of {_kind(parts[0])}"
+    if parts:
+        return " or ".join(_kind(part) for part in parts)
+    words = {int: "integer", float: "number", str: "text", bool: "true or false", type(None): "null"}
+    return words.get(annotation, "mapping" if is_model(annotation) else "path" if "Path" in str(annotation) else str(annotation))
+
+
+def _limits(constraints: tuple[Any, ...]) -> str:
+    found = [f"{sign} {getattr(rule, name):g}" for rule in constraints for name, sign in SIGNS.items() if hasattr(rule, name)]
+    return ", ".join(dict.fromkeys(found))

@@ -1,0 +1,107 @@
+"""``hippodrome scenario preview``: both drives and a few frames, in seconds instead of the whole run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.types import FloatArray, Frame, IntArray
+from hippodrome.eval.figures.frames import draw_contact_sheet
+from hippodrome.eval.figures.preview import draw_preview
+from hippodrome.sim.episode import Samples, draw_frame
+from hippodrome.sim.network import edge_lengths_m
+from hippodrome.sim.record import ROLES, RecordingPlan, Role, simulate
+from hippodrome.sim.render.probe import require_gl
+from hippodrome.sim.render.renderer import FrameRenderer
+from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.scene.build import build_scene
+from hippodrome.sim.types import Drive, Town
+
+STILLS = 3  # of each drive: one row of six shows town, light and traffic
+LITTLE_OVERLAP = 0.9  # a localization drive is meant to stay on roads that the map has
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Preview:
+    """What a scenario will be, as far as a quick look can tell."""
+
+    town: Town
+    drives: dict[Role, Drive]
+    samples: dict[Role, Samples]
+    mapped_share: float  # of the localization drive's length: on directed edges that the mapping drive sees
+
+    def lines(self) -> list[str]:
+        """Statistics for the terminal, one line each."""
+        return [
+            _town_line(self.town),
+            *(_drive_line(role, self.drives[role], self.samples[role]) for role in ROLES),
+            f"localization drive on mapped roads, same direction: {self.mapped_share:.0%}",
+            *(f"note: {note}" for note in self.notes()),
+        ]
+
+    def notes(self) -> list[str]:
+        few = f"{1.0 - self.mapped_share:.0%} of the localization drive is on roads that the map will not have; " \
+              "lengthen mapping.tour or shorten localization.tour"  # fmt: skip
+        return [*self.town.notes, *([few] if self.mapped_share < LITTLE_OVERLAP else [])]
+
+
+def preview_scenario(scenario: Scenario, out: Path) -> Preview:
+    """Simulates both drives, draws ``overview.png`` and ``stills.png`` into ``out``. Raises HippodromeError."""
+    require_gl()
+    plans = {role: RecordingPlan(scenario, role, out) for role in ROLES}
+    town = plans["mapping"].town()
+    simulated = {role: simulate(plan) for role, plan in plans.items()}
+    drives = {role: drive for role, (drive, _) in simulated.items()}
+    samples = {role: sampled for role, (_, sampled) in simulated.items()}
+    mapping, second = drives["mapping"], drives["localization"]
+    preview = Preview(town, drives, samples, mapped_share(town.network, mapping, second))
+    draw_preview(out / "overview.png", town.network, mapping.poses_m, visits_of_road(town.network, mapping.lane),
+                 second.poses_m, f"{scenario.name}: the two drives")  # fmt: skip
+    frames, captions = _stills(plans, town, preview)
+    draw_contact_sheet(out / "stills.png", frames, captions, title=f"{scenario.name}: stills of the mapping and the second drive")
+    return preview
+
+
+def visits_of_road(network: RoadNetwork, lane: IntArray) -> IntArray:
+    """How often (N,) the edge under each sample is entered during the whole drive; 1 inside junctions, which are shared."""
+    edge = network.lane_edge[lane]
+    entered = np.concatenate([[True], edge[1:] != edge[:-1]])
+    times = np.bincount(edge[entered], minlength=len(network.edge_ids))
+    return np.where(network.is_internal[lane], 1, times[edge]).astype(np.int32)
+
+
+def mapped_share(network: RoadNetwork, mapping: Drive, second: Drive) -> float:
+    """Share of the second drive's edges, by length and without junctions, that the mapping drive goes along too."""
+    lengths_m = edge_lengths_m(network)
+    known, wanted = (np.unique(network.lane_edge[drive.lane[~network.is_internal[drive.lane]]]) for drive in (mapping, second))
+    return float(lengths_m[np.intersect1d(known, wanted)].sum() / lengths_m[wanted].sum())
+
+
+def _stills(plans: dict[Role, RecordingPlan], town: Town, preview: Preview) -> tuple[list[Frame], list[str]]:
+    frames, captions = [], []
+    for role, plan in plans.items():
+        samples, conditions = preview.samples[role], plan.drive_spec.conditions
+        numbers = np.linspace(0, len(samples.frame_steps) - 1, 2 * STILLS + 1).astype(int)[1::2]  # not where a drive begins
+        with FrameRenderer(build_scene(town, plan.scenario.seed, conditions), plan.scenario.camera) as renderer:
+            for number in numbers:
+                frames.append(draw_frame(renderer, preview.drives[role], samples, int(number), conditions, plan.seed)[0])
+                captions.append(f"{role}, {samples.t_s[samples.frame_steps[number]]:.0f} s")
+    return frames, captions
+
+
+def _town_line(town: Town) -> str:
+    roads = edge_lengths_m(town.network)
+    return f"{town.name}: {np.count_nonzero(roads)} edges, {roads.sum() / 1e3:.2f} km of directed road, " \
+           f"{len(town.junction_polygons_m)} junctions, {'left' if town.left_hand else 'right'}-hand traffic"  # fmt: skip
+
+
+def _drive_line(role: Role, drive: Drive, samples: Samples) -> str:
+    return f"{role}: {_length_m(drive.poses_m):.0f} m in {drive.t_s[-1]:.0f} s, {len(samples.frame_steps)} frames, " \
+           f"{drive.coverage:.0%} of the drivable roads seen, {drive.revisit_share:.0%} driven before"  # fmt: skip
+
+
+def _length_m(poses_m: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(poses_m[:, :2], axis=0), axis=1).sum())

@@ -39,7 +39,7 @@ BEND_CUT_M2 = (
 )
 BEND_SHIFT_M = 1.0  # along-track shift between the bend that is drawn and the one that is driven
 STANDSTILL_M = 0.1  # a step shorter than this is as uncertain as this: quantised motions, gyro noise while standing
-FLOORS = {"along": 0.005, "across": 0.005, "heading": 0.0005, "log_scale": 0.0003, "lateral_m": 0.1, "lane_heading_rad": 0.01}
+FLOORS = {"along": 0.005, "across": 0.005, "heading": 0.0005, "log_scale": 0.0003, "lateral_m": 0.1, "lane_heading_rad": 0.05}
 # below these, no sensor or driver is believable, and the equations lose their condition
 
 

@@ -15,7 +15,7 @@ class ConfidenceConfig:
     distant_m: float = 30.0  # an alternative farther than this is another place
     least_gap_nats: float = 8.0  # odds of 3,000 to 1 against the best distant alternative
     window: int = 24  # steps (120 m) over which the score is judged: single corners must not decide
-    least_score_nats: float = -1.0  # mean per step: a right route scores -0.1 to -0.4
+    least_score_nats: float = -1.5  # mean per step, as far as driving off the network costs: a right route scores -0.1 to -0.4
 
 
 def distant_gap(points_m: FloatArray, alternatives: RouteAlternatives, distant_m: float) -> FloatArray:

@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 
 # What the callers of a compiled function must keep in order; numba takes tuples, not dataclasses.
 Tables: TypeAlias = tuple[Any, ...]  # reach_start, reach_bin, reach_m, reach_changes, bin heading, bin lane
-Costs: TypeAlias = tuple[float, ...]  # heading sigma, its limit, offset gain, half a bin, length sigma, scale step, lane change
+Costs: TypeAlias = tuple[
+    float, ...
+]  # heading sigma, its limit, offset gain, half a bin, length sigma, scale step, scale jump, lane change
 OffNetwork: TypeAlias = tuple[Any, ...]  # see ``expand_off``; then leave (nats), per step (nats), spread (nats)
 Survivors: TypeAlias = tuple[Any, ...]  # see ``forward``
 
@@ -29,6 +31,9 @@ _MOST_SUCCESSORS = (
 )
 _MOST_OFF = 192  # hypotheses off the network in one step; beyond this the worst gives way
 _SAME_PLACE_M = 4.0  # closer than this, two hypotheses off the network count as one
+_FARTHEST_JUMP = 12  # scale bins: 50 % either way
+_JUMP_SPREAD = 4.0  # nats; only hypotheses this close to the best may jump in scale, and only if they are few
+_MOST_JUMPING = 200
 _KNOWN_LANES = 30  # good hypotheses on more lanes than this: the route is not known, so nothing can be said to leave the network
 
 
@@ -53,17 +58,19 @@ def expand(
     scales: NDArray[Any],
     tables: Tables,
     costs: Costs,
+    jumps: bool,
     out: NDArray[Any],
 ) -> int:
     """Successors of one hypothesis over one step, counted. Rows of ``out``: bin, scale bin, log likelihood, offset, rest.
 
-    A bin either side of the predicted length is tried, for corners cut or swung out.
+    A bin either side of the predicted length is tried, for corners cut or swung out. ``jumps``: the scale may jump.
     """
     start, reach_bin, reach_m, reach_changes, bin_heading, _ = tables
-    sigma, limit, gain, half, length_sigma, scale_cost, change_cost = costs
+    sigma, limit, gain, half, length_sigma, scale_cost, jump_cost, change_cost = costs
     count = 0
     first, last = start[bin_], start[bin_ + 1]
-    for move in range(-1, 2):
+    farthest = _FARTHEST_JUMP if jumps else 1
+    for move in range(-farthest, farthest + 1):
         k_next = k + move
         if k_next < 0 or k_next >= scales.shape[0]:
             continue
@@ -84,7 +91,7 @@ def expand(
                 return count
             beyond = max(abs(error) - half, 0.0) / length_sigma
             turn = wrap(bin_heading[reach_bin[r]] - heading - offset)
-            cost = 0.5 * beyond * beyond + min(0.5 * (turn / sigma) ** 2, limit) + scale_cost * abs(move)
+            cost = 0.5 * beyond * beyond + min(0.5 * (turn / sigma) ** 2, limit) + min(scale_cost * abs(move), jump_cost)
             out[count, 0] = reach_bin[r]
             out[count, 1] = k_next
             out[count, 2] = -(cost + change_cost * reach_changes[r])
@@ -143,6 +150,16 @@ def grown(array: NDArray[Any], size: int) -> NDArray[Any]:
     bigger = np.empty(max(size, 2 * array.shape[0]), array.dtype)
     bigger[: array.shape[0]] = array
     return bigger
+
+
+@njit(cache=True)
+def jump_bar(score: NDArray[Any]) -> float:
+    """The score from which on hypotheses may jump in scale; infinite while too many are as good."""
+    bar = score.max() - _JUMP_SPREAD if score.shape[0] else math.inf
+    count = 0
+    for value in score:
+        count += value >= bar
+    return bar if count <= _MOST_JUMPING else math.inf
 
 
 @njit(cache=True)
@@ -215,9 +232,12 @@ def forward(
         begin, end = row_start[t - 1], row_start[t]
         size, best = end, _NOWHERE
         course = 0.5 * (headings[t - 1] + headings[t])
+        bar = jump_bar(score[begin:end])
         for i in range(begin, end):
             if bin_[i] >= 0:
-                found = expand(bin_[i], int(k[i]), offset[i], rest[i], headings[t], step, scales, tables, costs, out)
+                found = expand(
+                    bin_[i], int(k[i]), offset[i], rest[i], headings[t], step, scales, tables, costs, score[i] >= bar, out
+                )
             else:
                 j, far = -1 - bin_[i], step * scales[k[i]]
                 x, y = off_x[j] + far * math.cos(course + offset[i]), off_y[j] + far * math.sin(course + offset[i])
@@ -322,6 +342,7 @@ def backward(
     for t in range(times - 2, -1, -1):
         begin, end = row_start[t + 1], row_start[t + 2]
         course = 0.5 * (headings[t] + headings[t + 1])
+        bar = jump_bar(score[row_start[t] : begin])
         for i in range(begin, end):
             if through[i] < best - margin:
                 continue
@@ -331,7 +352,9 @@ def backward(
                 through[parent[i]] = max(through[parent[i]], through[i])
         for i in range(row_start[t], begin):
             if bin_[i] >= 0:
-                found = expand(bin_[i], int(k[i]), offset[i], rest[i], headings[t + 1], step, scales, tables, costs, out)
+                found = expand(
+                    bin_[i], int(k[i]), offset[i], rest[i], headings[t + 1], step, scales, tables, costs, score[i] >= bar, out
+                )
             else:
                 j, far = -1 - bin_[i], step * scales[k[i]]
                 x, y = places[j, 0] + far * math.cos(course + offset[i]), places[j, 1] + far * math.sin(course + offset[i])

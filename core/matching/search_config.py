@@ -14,9 +14,10 @@ class SearchCosts:
 
     heading_sigma_rad: float = 0.12  # odometry against a lane's polyline, corners included
     heading_limit_nats: float = 6.0  # truncation: a few steps astray (lane change, kinked lanes) must not kill a route
-    offset_gain: float = 0.05  # share of each heading error that the carried offset takes over: follows 1 rad of drift per km
+    offset_gain: float = 0.1  # share of each heading error that the carried offset takes over: follows a poor gyro's drift
     length_sigma_m: float = 0.4  # of a step, beyond what the carried rest absorbs: corners cut or swung out
     scale_step_nats: float = 3.0  # one bin of scale change in a step: about 1 in 20
+    scale_jump_nats: float = 8.0  # any number of bins at once, as when a visual odometry starts afresh
     lane_change_nats: float = 5.0  # about 1 in 150 steps, once in 750 m
 
 
@@ -27,7 +28,7 @@ class OffNetworkCosts:
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     leave_nats: float = 8.0  # rare: once in 15 km
-    step_nats: float = 1.0  # a right route costs 0.1-0.3 a step, a wrong one 1 and more
+    step_nats: float = 1.5  # a right route costs 0.1-0.4 a step, in bends of a poor gyro up to 1.3; a wrong one 2 and more
     return_nats: float = 4.0
     drift: float = 0.05  # growth of the place's sigma per metre off the network: scale and heading drift
     turn_limit_rad: float = 0.5  # largest difference of heading at which a lane is taken up again
@@ -39,7 +40,7 @@ class RouteSearchConfig:
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     bin_m: float = 1.0
-    step_m: float = 5.0  # at the middle of the scale range
+    step_m: float = 5.0  # if the drive's brisk speed is the network's usual limit
     scale_bin: float = 0.04  # of log scale
     beam_nats: float = 40.0
     most_survivors: int = 60_000  # bounds time and memory where a town is too self-similar for the beam to prune

@@ -29,9 +29,9 @@ class SearchField:
 
 def search_field(visits: Visits, network: RoadNetwork, config: RouteSearchConfig) -> SearchField:
     """Fine bins over the whole network, and the drive in steps of about ``step_m``."""
-    low, high = scale_range(visits, network)
+    low, typical, high = scale_range(visits, network)
     log_scale = np.arange(np.log(low), np.log(high) + config.scale_bin, config.scale_bin)
-    track = make_track(visits, min(config.step_m / np.sqrt(low * high), 0.25 * driven(visits)[-1]))
+    track = make_track(visits, min(config.step_m / typical, 0.25 * driven(visits)[-1]))
     graph = build_lane_graph(network, track.step * np.exp(log_scale[-1]) + 4.0 * config.bin_m, config.bin_m)
     return SearchField(network, track, log_scale, graph, config.costs, config.off_network, config.bin_m)
 
@@ -52,7 +52,7 @@ def kernel_arguments(field: SearchField, heading_rad: FloatArray) -> KernelArgum
     tables = graph.reach_start, graph.reach_bin, graph.reach_m, graph.reach_changes, graph.heading_rad, graph.lane
     on_road = (
         costs.heading_sigma_rad, costs.heading_limit_nats, costs.offset_gain, 0.5 * field.bin_m, costs.length_sigma_m,
-        costs.scale_step_nats, costs.lane_change_nats,
+        costs.scale_step_nats, costs.scale_jump_nats, costs.lane_change_nats,
     )  # fmt: skip
     cells = bin_cells(graph)
     grid = graph.points_m, cells.start, cells.bin, cells.origin_m[0], cells.origin_m[1], cells.size_m, cells.columns, cells.rows

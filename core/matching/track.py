@@ -9,7 +9,8 @@ import numpy as np
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, Visits
 
-WIDE_SCALES = (0.1, 10.0)  # metres per map unit tried when the visits carry no usable time
+WANDER = 1.5  # factor by which the scale may leave its usual value for a while, as after a re-start of visual odometry
+WIDE_SCALES = (0.1, 1.0, 10.0)  # metres per map unit tried when the visits carry no usable time
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +41,8 @@ def driven(visits: Visits) -> FloatArray:
     return arc
 
 
-def scale_range(visits: Visits, network: RoadNetwork) -> tuple[float, float]:
-    """Metres per map unit that are possible at all: a driver's brisk speed is 20-130 % of what the network's limits allow.
+def scale_range(visits: Visits, network: RoadNetwork) -> tuple[float, float, float]:
+    """Least, typical and largest possible metres per map unit: a driver's brisk speed is 25-130 % of the network's limits.
 
     Brisk: the 90th percentile of the speeds while moving, in map units; stops and jams do not lower it much.
     """
@@ -54,4 +55,5 @@ def scale_range(visits: Visits, network: RoadNetwork) -> tuple[float, float]:
     speed = units[moving] / seconds[moving]
     brisk = float(np.percentile(speed, 90.0))
     limit = network.speed_limit_mps[~network.is_internal]
-    return 0.2 * float(np.median(limit)) / brisk, 1.3 * float(np.max(limit)) / brisk
+    usual = float(np.median(limit))
+    return 0.25 / WANDER * usual / brisk, usual / brisk, 1.3 * WANDER * float(np.max(limit)) / brisk

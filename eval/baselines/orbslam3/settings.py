@@ -1,0 +1,51 @@
+"""ORB-SLAM3's settings for a rectified pair of pinhole cameras, in the older format: the newer one crashes for such pairs."""
+
+from __future__ import annotations
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.sim.render.camera import CameraSpec
+
+ATLAS = "atlas"  # bare name, relative to the working directory; the tracker adds ".osa"
+FEATURES = 1200  # per image; the values below are those of the published KITTI and EuRoC settings
+VIEWER = {
+    "KeyFrameSize": 0.05,
+    "KeyFrameLineWidth": 1.0,
+    "GraphLineWidth": 0.9,
+    "PointSize": 2.0,
+    "CameraSize": 0.08,
+    "CameraLineWidth": 3.0,
+    "ViewpointX": 0.0,
+    "ViewpointY": -0.7,
+    "ViewpointZ": -1.8,
+    "ViewpointF": 500.0,
+}
+
+
+def settings_text(camera: CameraSpec) -> str:
+    """The YAML, OpenCV's dialect. The focal length is the camera's, the principal point its middle, there is no distortion."""
+    if camera.stereo_baseline_m is None:
+        raise HippodromeError("ORB-SLAM3: camera.stereo_baseline_m is not set, a stereo pair needs a baseline")
+    focal_px = camera.focal_px()
+    values: dict[str, object] = {
+        "Camera.type": '"PinHole"',
+        "Camera.fx": focal_px,
+        "Camera.fy": focal_px,
+        "Camera.cx": camera.width / 2.0 - 0.5,
+        "Camera.cy": camera.height / 2.0 - 0.5,
+        **{f"Camera.{name}": 0.0 for name in ("k1", "k2", "p1", "p2")},
+        "Camera.bFishEye": 0,
+        "Camera.width": camera.width,
+        "Camera.height": camera.height,
+        "Camera.fps": round(camera.rate_hz),
+        "Camera.bf": focal_px * camera.stereo_baseline_m,
+        "Camera.RGB": 1,
+        "ThDepth": 60.0,
+        "ORBextractor.nFeatures": FEATURES,
+        "ORBextractor.scaleFactor": 1.2,
+        "ORBextractor.nLevels": 8,
+        "ORBextractor.iniThFAST": 20,
+        "ORBextractor.minThFAST": 7,
+        "System.SaveAtlasToFile": f'"{ATLAS}"',
+        **{f"Viewer.{name}": value for name, value in VIEWER.items()},
+    }
+    return "%YAML:1.0\n" + "".join(f"{name}: {value}\n" for name, value in values.items())

@@ -1,0 +1,175 @@
+"""A tracker's process may crash, hang or lose its way: each becomes a row that says so, and a good run becomes figures.
+
+The processes here are stand-ins; the last test runs the real tracker where its environment has been made.
+"""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from hippodrome.core import se2
+from hippodrome.core.types import HippodromeError, Trajectory
+from hippodrome.eval.baselines.orbslam3 import environment, tracker
+from hippodrome.eval.baselines.orbslam3.environment import NotInstalled, ensure_environment
+from hippodrome.eval.baselines.orbslam3.poses import body_poses, read_camera_tum, thinned
+from hippodrome.eval.baselines.orbslam3.rows import FINAL, LIVE, failed_rows, rows
+from hippodrome.eval.baselines.orbslam3.settings import settings_text
+from hippodrome.eval.baselines.orbslam3.tracker import StereoDrive, run_tracker
+from hippodrome.sim.episode import Samples
+from hippodrome.sim.render.camera import CameraSpec
+
+CAMERA = CameraSpec(width=64, height=48, stereo_baseline_m=0.5, forward_m=1.6)
+FRAMES = 40
+
+STAND_IN = """\
+import json, os, sys, time
+import numpy as np
+size = int(sys.argv[3]) * int(sys.argv[4])
+times, brightness = [], []
+while len(data := sys.stdin.buffer.read(8 + 2 * size)) == 8 + 2 * size:
+    times.append(float(np.frombuffer(data, "<f8", 1)[0]))
+    brightness.append([int(data[8]), int(data[8 + size])])
+{ending}
+way = [1.0 * k for k in range(len(times))]  # straight ahead: +z of the first camera, a metre a frame
+lines = [f"{{t!r}} 0 0 {{w!r}} 0 0 0 1" for t, w in zip(times, way)]
+for name in ("live", "final", "keyframes"):
+    open(f"{{name}}.tum", "w").write("\\n".join(lines) + "\\n")
+open("brightness.json", "w").write(json.dumps(brightness))
+open("result.json", "w").write(json.dumps(dict(frames=len(times), tracked={tracked}, cpu_s=1.0, loading_cpu_s=0.5,
+    wall_s=2.0, longest_frame_s=0.1, peak_rss_bytes=10**8, map_bytes=5 * 10**6)))
+"""
+
+
+class FakeRecording:
+    """A straight drive eastwards, a metre a frame; frame ``n`` is as bright as its number, the right one is brighter by 100."""
+
+    def __init__(self):
+        steps = np.arange(2 * FRAMES)
+        poses = np.column_stack([0.5 * (steps - 1) + 7.0, np.full(2 * FRAMES, 3.0), np.zeros(2 * FRAMES)])
+        frame = np.where(steps % 2 == 1, steps // 2, -1).astype(np.int32)
+        nothing = np.zeros(2 * FRAMES)
+        lane = np.zeros(2 * FRAMES, dtype=np.int32)
+        self.samples = Samples(0.05 * (steps + 1), nothing, nothing, nothing, frame, poses, nothing, lane, nothing, ("a",))
+
+    def frame(self, number, side=""):
+        return np.full((48, 64, 3), number + (100 if side == "r" else 0), dtype=np.uint8)
+
+    def ground_truth(self):
+        return Trajectory(self.samples.t_s, self.samples.poses_m)
+
+
+DRIVE = StereoDrive(FakeRecording(), CAMERA, FRAMES)
+
+
+def run(monkeypatch, folder, ending="", tracked="len(times)"):
+    script = folder / "stand_in.py"
+    folder.mkdir(parents=True, exist_ok=True)
+    script.write_text(STAND_IN.format(ending=ending, tracked=tracked))
+    monkeypatch.setattr(tracker, "RUNNER", script)
+    return run_tracker(Path(sys.executable), folder / "vocabulary.txt", DRIVE, folder / "run")
+
+
+def test_a_good_run_becomes_two_rows(monkeypatch, tmp_path):
+    done = run(monkeypatch, tmp_path)
+    assert done.failure is None
+    assert_array_equal(json.loads((tmp_path / "run" / "brightness.json").read_text()), [[n, n + 100] for n in range(FRAMES)])
+    live, final = rows([done, done, done], DRIVE)
+    assert (live.method, final.method) == (LIVE, FINAL)
+    assert live.failure is None
+    assert live.cpu_percent == pytest.approx(100 * 1.0 / 4.0)
+    assert (live.camera_frames, live.keyframes, live.map_bytes) == (FRAMES, FRAMES, 5_000_000)
+    assert_allclose([live.ape_start.mean_m, live.rpe.mean_m], 0.0, atol=1e-9)
+    assert len(live.runs) == 3
+
+
+def test_a_finished_run_is_read_back_not_run_again(monkeypatch, tmp_path):
+    run(monkeypatch, tmp_path)
+    assert run(monkeypatch, tmp_path, ending="raise SystemExit('run again')").failure is None
+
+
+@pytest.mark.parametrize(
+    ("ending", "tracked", "cause"),
+    [
+        ("print('no such map'); sys.exit(3)", "0", "crashed: exit status 3; last words: no such map"),
+        ("os.abort()", "0", "crashed: signal 6"),
+        ("pass", "3", "lost: 3 of 40 frames tracked"),
+        ("times.pop()", "len(times)", "39 of 40 frames"),
+    ],
+)
+def test_what_goes_wrong_has_a_name(monkeypatch, tmp_path, ending, tracked, cause):
+    done = run(monkeypatch, tmp_path, ending, tracked)
+    assert cause in done.failure
+    live, final = rows([done], DRIVE)
+    assert cause in live.failure
+    assert cause in final.failure
+
+
+def test_a_hang_is_ended(monkeypatch, tmp_path):
+    monkeypatch.setattr(tracker, "LIMIT_BASE_S", 1.0)
+    monkeypatch.setattr(tracker, "LIMIT_PER_FRAME_S", 0.0)
+    assert "hung" in run(monkeypatch, tmp_path, ending="time.sleep(60)").failure
+
+
+def test_some_failures_leave_a_row_of_the_others(monkeypatch, tmp_path):
+    good, bad = run(monkeypatch, tmp_path / "good"), run(monkeypatch, tmp_path / "bad", ending="sys.exit(3)")
+    live, _ = rows([bad, good], DRIVE)
+    assert live.failure is None
+    assert live.median_run == good.folder.name
+    assert "crashed" in live.runs[0]["failure"]
+
+
+def test_a_tracker_that_cannot_be_installed_has_rows_too(monkeypatch, tmp_path):
+    monkeypatch.setattr(environment, "PACKAGES", ("a-package-that-has-no-name/",))
+    with pytest.raises(NotInstalled, match="installing"):
+        ensure_environment(tmp_path / "venv")
+    assert [row.failure for row in failed_rows("not run: why")] == ["not run: why"] * 2
+
+
+def test_body_poses_by_hand():
+    """The camera turns left by 90 deg while it moves 5 m ahead and 2 m to the left; y of the camera points down."""
+    half = np.sqrt(0.5)
+    turned = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, -half, 0.0, half]])
+    assert_allclose(body_poses(np.array([[0.0, 0, 0], [-2.0, 0, 5.0]]), turned, 0.0), [[0, 0, 0], [5, 2, np.pi / 2]], atol=1e-12)
+
+
+def test_the_body_is_behind_the_camera():
+    rng = np.random.default_rng(0)
+    body = np.column_stack([rng.normal(size=(20, 2)), rng.uniform(-3, 3, 20)])
+    camera = se2.compose(body, np.array([1.6, 0.0, 0.0]))
+    positions = np.column_stack([-camera[:, 1], np.zeros(20), camera[:, 0]])
+    quaternions = np.column_stack([np.zeros(20), -np.sin(camera[:, 2] / 2), np.zeros(20), np.cos(camera[:, 2] / 2)])
+    assert_allclose(body_poses(positions, quaternions, 1.6), body, atol=1e-12)
+
+
+@pytest.mark.parametrize("text", ["", "0 1 2\n", "zero 0 0 0 0 0 0 1\n"])
+def test_a_broken_trajectory_is_refused(tmp_path, text):
+    path = tmp_path / "live.tum"
+    path.write_text(text)
+    with pytest.raises(HippodromeError, match="live.tum"):
+        read_camera_tum(path, 1.6)
+
+
+def test_thinning_keeps_a_sample_per_stretch():
+    trajectory = Trajectory(np.arange(21.0), np.column_stack([np.arange(21.0), np.zeros((21, 2))]))
+    assert_array_equal(thinned(trajectory, 5.0).poses[:, 0], [0, 5, 10, 15, 20])
+
+
+@pytest.mark.skipif("HIPPODROME_ORBSLAM3" not in os.environ, reason="set HIPPODROME_ORBSLAM3 to the venv of `make baselines`")
+def test_the_real_tracker_starts_and_reports(tmp_path):
+    """Frames without a corner: it loads vocabulary and settings, never initialises, and says that it is lost."""
+    from hippodrome.eval.baselines.orbslam3.vocabulary import to_text, train
+
+    rng = np.random.default_rng(0)
+    descriptors = rng.integers(0, 256, (2000, 32), dtype=np.uint8)
+    (tmp_path / "vocabulary.txt").write_text(to_text(train(descriptors, np.arange(2000, dtype=np.int32) // 100, rng, 10, 3)))
+    python = Path(os.environ["HIPPODROME_ORBSLAM3"]) / "bin" / "python"
+    camera = CameraSpec(width=320, height=240, stereo_baseline_m=0.5)
+    drive = StereoDrive(FakeRecording(), camera, FRAMES)
+    drive.recording.frame = lambda number, side="": np.full((240, 320, 3), 100, dtype=np.uint8)
+    assert settings_text(camera)
+    assert "lost: 0 of 40" in run_tracker(python, tmp_path / "vocabulary.txt", drive, tmp_path / "run").failure

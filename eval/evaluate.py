@@ -12,6 +12,7 @@ import numpy as np
 
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import CognitiveMap, HippodromeError, StartPose, Trajectory
+from hippodrome.eval.baselines.rivals import rivals
 from hippodrome.eval.localization_score import score_localization
 from hippodrome.eval.map_quality import closures, matched_lane_accuracy, matched_lane_ids, score_closures
 from hippodrome.eval.materials import Materials, Scored, Topometric, file_stem, gather, score_trajectory
@@ -64,6 +65,8 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
             **_counts(semi_metric),
         ),
     ]
+    for rival in rivals(materials, semi_metric.t_s):
+        rows.append(_own_frame_row(rival.method, {rival.method: rival.scored}, truth, **rival.fields))
     found: dict[str, Topometric] = {}
     for method, mode in MODES:
         try:

@@ -1,4 +1,4 @@
-"""What ORB-SLAM3 is given: a vocabulary in DBoW2's text format, settings that describe the camera, frames as the runner reads them."""
+"""What ORB-SLAM3 is given: a vocabulary in DBoW2's text format, and settings that describe the camera."""
 
 import numpy as np
 import pytest

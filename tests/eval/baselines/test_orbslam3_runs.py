@@ -150,7 +150,7 @@ def test_the_body_is_behind_the_camera():
 def test_a_broken_trajectory_is_refused(tmp_path, text):
     path = tmp_path / "live.tum"
     path.write_text(text)
-    with pytest.raises(HippodromeError, match="live.tum"):
+    with pytest.raises(HippodromeError, match=r"live\.tum"):
         read_camera_tum(path, 1.6)
 
 

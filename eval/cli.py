@@ -106,6 +106,29 @@ def _parser() -> argparse.ArgumentParser:
     )
     localize.add_argument("--out", type=Path, required=True, metavar="TRAJECTORY.tum")
     localize.set_defaults(command=_localize)
+
+    robust = commands.add_parser(
+        "robustness", help="localize under other light, weather, traffic and noise", description=_robustness.__doc__
+    )
+    robust.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="its mapping drive is mapped")
+    robust.add_argument("--conditions", nargs="+", metavar="NAME", help="some of the conditions only (default: all)")
+    robust.add_argument("--sequences", type=_positive, default=8, metavar="N", help="unknown starts per condition (default: 8)")
+    robust.add_argument(
+        "--workers", type=_positive, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)"
+    )
+    robust.add_argument("--out", type=Path, default=Path("out/robustness"), metavar="DIR", help="default: out/robustness")
+    robust.set_defaults(command=_robustness)
+
+    baselines = commands.add_parser(
+        "baselines", help="score the rivals on the same drive, ORB-SLAM3 among them", description=_baselines.__doc__
+    )
+    baselines.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="see scenarios/")
+    baselines.add_argument("--runs", type=_positive, default=3, metavar="N", help="of ORB-SLAM3, which varies (default: 3)")
+    baselines.add_argument("--seconds", type=float, metavar="S", help="a quick look: ORB-SLAM3 only, on the first S seconds")
+    baselines.add_argument("--paced", action="store_true", help="feed frames at the camera's rate, not as fast as they are taken")
+    baselines.add_argument("--workers", type=_positive, default=os.cpu_count() or 1, metavar="N", help="processes that render")
+    baselines.add_argument("--out", type=Path, default=Path("out/baselines"), metavar="DIR", help="default: out/baselines")
+    baselines.set_defaults(command=_baselines)
     return parser
 
 
@@ -183,6 +206,22 @@ def _localize(options: argparse.Namespace) -> int:
     from hippodrome.eval.stages import localize_files
 
     localize_files(options.map, options.recording, options.network, options.scenario, options.out)
+    return DONE
+
+
+def _robustness(options: argparse.Namespace) -> int:
+    """Map once, then localize from several unknown starts under each of many conditions; writes a table and a heat map."""
+    from hippodrome.eval.robustness import robustness
+
+    robustness(options.scenario, options.conditions, options.sequences, options.workers, options.out)
+    return DONE
+
+
+def _baselines(options: argparse.Namespace) -> int:
+    """Evaluate a scenario, run binocular ORB-SLAM3 on its mapping drive and write Table I with all rows; resumable."""
+    from hippodrome.eval.baselines.run import BaselineOptions, run_baselines
+
+    run_baselines(BaselineOptions(options.scenario, options.out, options.runs, options.workers, options.seconds, options.paced))
     return DONE
 
 

@@ -5,10 +5,10 @@ BIN := $(VENV)/bin
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup eval paper test lint bench clean
+.PHONY: help setup eval paper baselines test lint bench docs clean
 
 help:  ## list the targets
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-9s %s\n", $$1, $$2}'
 
 $(VENV)/.ready: pyproject.toml constraints.txt build_proto.py $(wildcard proto/*.proto)
 	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || { rm -rf $(VENV); \
@@ -31,6 +31,9 @@ eval: setup  ## build, refine, localize and score maps of several generated town
 paper: setup  ## the paper's drive: 1,315 s, 14,717 frames, about 7.2 km
 	@$(BIN)/hippodrome eval scenarios/paper.yaml --workers $(WORKERS) --out out/paper
 
+baselines: setup  ## the paper's drive with its rivals, binocular ORB-SLAM3 among them, in out/baselines
+	@$(BIN)/hippodrome baselines scenarios/paper.yaml --workers $(WORKERS) --out out/baselines
+
 test: setup  ## the whole test suite, on real SUMO and real GL
 	@$(BIN)/python -m pytest tests
 
@@ -39,6 +42,9 @@ lint: setup  ## ruff and strict mypy
 
 bench: setup  ## speed and memory, as ratios measured in one run
 	@$(BIN)/python -m benchmarks
+
+docs: setup  ## make the tables of docs/scenarios.md anew from the models
+	@$(BIN)/python -m hippodrome.eval.authoring.reference docs/scenarios.md
 
 clean:  ## remove results, keep the environment
 	@rm -rf out

@@ -14,7 +14,9 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 
+from hippodrome.eval.authoring.meanings import MEANINGS
 from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.self_motion import SelfMotionNoise
 
 SIGNS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
@@ -37,13 +39,23 @@ class Key:
 @lru_cache(maxsize=1)
 def scenario_keys() -> tuple[Key, ...]:
     """All keys that hold values, in the order of the models."""
-    defaults = Scenario(name="name").model_dump(mode="json")
-    return tuple(_keys(Scenario, (), defaults))
+    return tuple(_keys(Scenario, (), Scenario(name="name").model_dump(mode="json")))
+
+
+@lru_cache(maxsize=1)
+def noise_keys() -> tuple[Key, ...]:
+    """The keys that ``noise`` has when it is no level's name."""
+    return tuple(_keys(SelfMotionNoise, ("noise",), {"noise": None}))
 
 
 def is_model(kind: Any) -> bool:
     """Whether a type has keys of its own."""
     return isinstance(kind, type) and (issubclass(kind, BaseModel) or dataclasses.is_dataclass(kind))
+
+
+def meanings(model: type) -> dict[str, str]:
+    """What each field means: its comment, or its entry in ``MEANINGS``."""
+    return {name: comment or MEANINGS.get(f"{model.__name__}.{name}", "") for name, comment in comments(model).items()}
 
 
 @lru_cache(maxsize=256)
@@ -77,13 +89,13 @@ def fields_of(model: type) -> Iterator[tuple[str, Any, tuple[Any, ...]]]:
 
 
 def _keys(model: type, path: tuple[str, ...], defaults: Any) -> Iterator[Key]:
-    meanings = comments(model)
+    words = meanings(model)
     for name, annotation, constraints in fields_of(model):
         default = defaults.get(name) if isinstance(defaults, dict) else None
         if is_model(annotation):
             yield from _keys(annotation, (*path, name), default)
         else:
-            yield Key((*path, name), _kind(annotation), default, _limits(constraints), meanings.get(name, ""))
+            yield Key((*path, name), _kind(annotation), default, _limits(constraints), words.get(name, ""))
 
 
 def _inner_constraints(annotation: Any) -> tuple[Any, ...]:
@@ -109,5 +121,12 @@ def _kind(annotation: Any) -> str:
 
 
 def _limits(constraints: tuple[Any, ...]) -> str:
-    found = [f"{sign} {getattr(rule, name):g}" for rule in constraints for name, sign in SIGNS.items() if hasattr(rule, name)]
+    found = [
+        f"{sign} {_plain(getattr(rule, name))}" for rule in constraints for name, sign in SIGNS.items() if hasattr(rule, name)
+    ]
     return ", ".join(dict.fromkeys(found))
+
+
+def _plain(limit: float) -> str:
+    """A limit without an exponent: as people write it."""
+    return f"{limit:,.0f}" if limit == int(limit) else f"{limit:g}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from hippodrome.eval.authoring.keys import comments, fields_of, is_model
+from hippodrome.eval.authoring.keys import fields_of, is_model, meanings
 from hippodrome.sim.scenario import Scenario
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -14,10 +14,10 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 def scenario_schema() -> dict[str, Any]:
     """The schema, with each key's meaning as its description."""
     schema = Scenario.model_json_schema()
-    meanings = dict(_meanings(Scenario, set()))
+    words = dict(_meanings(Scenario, set()))
     for title, part in {**schema["$defs"], "Scenario": schema}.items():
         for key, field in part.get("properties", {}).items():
-            if meaning := meanings.get(title, {}).get(key):
+            if meaning := words.get(title, {}).get(key):
                 field["description"] = meaning
     return {"$schema": DIALECT, **schema}
 
@@ -32,4 +32,4 @@ def _meanings(model: type, seen: set[type]) -> list[tuple[str, dict[str, str]]]:
         return []
     seen.add(model)
     inner = [kind for _, kind, _ in fields_of(model) if is_model(kind)]
-    return [(model.__name__, comments(model)), *(pair for kind in inner for pair in _meanings(kind, seen))]
+    return [(model.__name__, meanings(model)), *(pair for kind in inner for pair in _meanings(kind, seen))]

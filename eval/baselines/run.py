@@ -25,7 +25,7 @@ from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario
 
 ORBSLAM3_RESULTS = "orb-slam3.json"
-STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5, "supersample": 1}  # at this size a pixel is as fine as ours at 2
+STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5}  # the size and about the baseline of the published car data sets
 
 
 @dataclass(frozen=True, slots=True)

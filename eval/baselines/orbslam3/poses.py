@@ -14,13 +14,18 @@ COLUMNS = 8
 
 
 def read_camera_tum(path: Path, forward_m: float) -> Trajectory:
-    """Body poses from a TUM file of camera poses; the camera sits ``forward_m`` ahead of the body and looks ahead."""
+    """Body poses from a TUM file of camera poses; the camera sits ``forward_m`` ahead of the body and looks ahead.
+
+    For frames that it lost, the tracker writes the line before once more, old time stamp included: such lines are dropped.
+    """
     try:
-        table = np.loadtxt(path, dtype=np.float64, ndmin=2)
+        lines = path.read_text(encoding="utf-8").splitlines()
+        table = np.array([[float(word) for word in line.split()] for line in lines if line.strip()], dtype=np.float64)
     except (OSError, ValueError) as error:
         raise HippodromeError(f"{path}: not a trajectory: {error}") from None
-    if table.size == 0 or table.shape[1] != COLUMNS:
+    if table.ndim != 2 or table.shape[1] != COLUMNS:
         raise HippodromeError(f"{path}: no poses, or not {COLUMNS} columns a line (t x y z qx qy qz qw)")
+    table = table[np.concatenate([[True], np.diff(table[:, 0]) > 0.0])]
     body = body_poses(table[:, 1:4], table[:, 4:8], forward_m)
     trajectory = Trajectory(table[:, 0], body)
     check_trajectory(trajectory, str(path))

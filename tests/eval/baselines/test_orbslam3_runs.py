@@ -154,6 +154,12 @@ def test_a_broken_trajectory_is_refused(tmp_path, text):
         read_camera_tum(path, 1.6)
 
 
+def test_lines_repeated_for_lost_frames_are_dropped(tmp_path):
+    path = tmp_path / "final.tum"
+    path.write_text("0.1 0 0 0 0 0 0 1\n0.2 0 0 1 0 0 0 1\n0.2 0 0 1 0 0 0 1\n0.4 0 0 3 0 0 0 1\n")
+    assert_allclose(read_camera_tum(path, 0.0).t_s, [0.1, 0.2, 0.4])
+
+
 def test_thinning_keeps_a_sample_per_stretch():
     trajectory = Trajectory(np.arange(21.0), np.column_stack([np.arange(21.0), np.zeros((21, 2))]))
     assert_array_equal(thinned(trajectory, 5.0).poses[:, 0], [0, 5, 10, 15, 20])

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from hippodrome.core.types import HippodromeError, StartPose
 from hippodrome.eval.authoring.command import add_scenario_command
+from hippodrome.eval.gate.command import add_gate_command
 
 DONE, THRESHOLD_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -59,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     evaluate.set_defaults(command=_evaluate)
 
     add_scenario_command(commands)
+    add_gate_command(commands)
 
     render = commands.add_parser("render", help="make the recordings of a scenario only", description=_render.__doc__)
     _scenario_options(render, several=False)

@@ -1,0 +1,118 @@
+"""The baseline of the gate: the figures of earlier code, one cell for each scenario, seed and method."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.eval.results import ErrorSummary, Results, Row, ScenarioResult, to_json
+from hippodrome.proto.atomic import write_atomically
+
+FORMAT: Final = 1
+# Not part of what is asked, but of how it is answered: a change there is what the gate is for.
+ANSWERS: Final = ("mapper", "refine", "localizer", "thresholds", "description")
+
+
+class GateError(HippodromeError):
+    """A baseline that cannot be read, or must not be compared with."""
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Figure(_Model):
+    """One number, smaller is better, and the words that say what it measures."""
+
+    value: float
+    definition: str
+
+
+class Cell(_Model):
+    """What one method made of one scenario with one seed."""
+
+    scenario: str
+    seed: int
+    question: str  # hash of everything in the scenario that the method has to answer
+    method: str
+    failed: bool
+    localized: bool | None  # None: the method does not localize
+    figures: dict[str, Figure]
+
+    @property
+    def key(self) -> tuple[str, int, str]:
+        return self.scenario, self.seed, self.method
+
+
+class Baseline(_Model):
+    """A committed file."""
+
+    format: int = FORMAT
+    cells: tuple[Cell, ...]
+
+
+def baseline_of(runs: list[Results]) -> Baseline:
+    """The cells of the measured rows of several runs, sorted."""
+    cells = [_cell(result, row) for run in runs for result in run.scenarios for row in result.rows if not row.quoted]
+    return Baseline(cells=tuple(sorted(cells, key=lambda cell: cell.key)))
+
+
+def write_baseline(path: Path, baseline: Baseline) -> None:
+    """Write atomically; the same cells give the same bytes, and a changed figure one changed line."""
+    write_atomically(path, to_json(baseline.model_dump(), str(path)).encode())
+
+
+def read_baseline(path: Path) -> Baseline:
+    """Read and validate. Raises GateError."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(data, dict) and data.get("format") != FORMAT:
+            raise GateError(
+                f"{path}: baseline format {data.get('format')}, this version reads {FORMAT}; refresh it with --update"
+            )
+        return Baseline.model_validate(data)
+    except FileNotFoundError:
+        raise GateError(f"{path}: no baseline there; make one with `hippodrome gate --update`") from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise GateError(f"{path}: not a readable baseline: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise GateError(f"{path}: {place or 'top level'}: {first['msg']}") from error
+
+
+def question_of(configuration: dict[str, Any]) -> str:
+    """Hash of what is asked: town, drives, camera, noise. Constants of the algorithms are not in it."""
+    asked = {key: value for key, value in configuration.items() if key not in ANSWERS}
+    return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _cell(result: ScenarioResult, row: Row) -> Cell:
+    configuration = getattr(result, "configuration", None) or {}
+    return Cell(
+        scenario=result.name,
+        seed=result.seed,
+        question=question_of(configuration),
+        method=row.method,
+        failed=row.failure is not None,
+        localized=row.localization.success if row.localization is not None else None,
+        figures=_figures(row),
+    )
+
+
+def _figures(row: Row) -> dict[str, Figure]:
+    errors: dict[str, ErrorSummary | None] = {"APE": row.ape, "RPE": row.rpe}
+    figures = {
+        f"{name} mean (m)": Figure(value=error.mean_m, definition=error.definition)
+        for name, error in errors.items()
+        if error is not None
+    }
+    located = row.localization
+    if located is not None and located.error_mean_m is not None:
+        figures["localization error mean (m)"] = Figure(value=located.error_mean_m, definition=located.definition)
+    return figures

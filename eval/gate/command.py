@@ -1,0 +1,42 @@
+"""``hippodrome gate``: run scenarios with several seeds, hold them against their limits and against a committed baseline."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+DONE, WORSE = 0, 1
+SEEDS = (1, 2, 3)
+
+
+def add_gate_command(commands: Any) -> None:
+    """Adds ``gate`` to the parser's ``commands``."""
+    parser = commands.add_parser("gate", help="compare with a baseline over several seeds", description=_gate.__doc__)
+    parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.yaml")
+    parser.add_argument("--baseline", type=Path, default=Path("baseline.json"), metavar="FILE", help="default: baseline.json")
+    parser.add_argument("--seeds", type=_seeds, default=SEEDS, metavar="1,2,3", help="default: 1,2,3")
+    parser.add_argument("--update", action="store_true", help="make this run the baseline instead of comparing with it")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)")
+    parser.add_argument("--out", type=Path, default=Path("out/gate"), metavar="DIR", help="default: out/gate")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the verdict as JUnit XML as well")
+    parser.set_defaults(command=_gate)
+
+
+def _seeds(text: str) -> tuple[int, ...]:
+    try:
+        seeds = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a list of whole numbers like 1,2,3") from None
+    if len(set(seeds)) != len(seeds) or not all(0 <= seed < 2**31 for seed in seeds):
+        raise argparse.ArgumentTypeError(f"'{text}': seeds differ from one another and lie between 0 and 2147483647")
+    return seeds
+
+
+def _gate(options: argparse.Namespace) -> int:
+    """Fail (exit status 1) if a limit of a scenario does not hold, or a figure is worse than the baseline's and not by chance."""
+    from hippodrome.eval.gate.run import gate
+
+    passed = gate(options.scenarios, options.seeds, options.baseline, options.update, options.workers, options.out, options.junit)
+    return DONE if passed else WORSE

@@ -1,0 +1,134 @@
+"""Whether a run is worse than the baseline: a paired test over scenarios and seeds, figure by figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.stats import t as student_t
+
+from hippodrome.eval.gate.baseline import Baseline, Cell, GateError
+
+ALPHA: Final = 0.05  # chance of failing a build that is no worse, over all figures together
+TOLERANCE: Final = 0.03  # a mean change below this is not worth anybody's morning, however certain
+REPEATABILITY: Final = 0.01  # least standard deviation of a pair's ratio: other processors and drivers round differently
+FLOOR_M: Final = 0.01  # errors below a centimetre count as one: their ratios mean nothing
+MIN_PAIRS: Final = 3  # fewer say nothing about chance
+
+Key = tuple[str, int, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One figure of one method over all its pairs."""
+
+    method: str
+    figure: str
+    pairs: int
+    before: float  # geometric means
+    after: float
+    moved: bool  # in any pair
+    p_worse: float  # of a change this bad by chance, corrected for the number of figures
+    regressed: bool
+    worst: str  # the pair that changed most for the worse
+
+    @property
+    def ratio(self) -> float:
+        return self.after / self.before
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """All that moved, and what was lost outright."""
+
+    changes: tuple[Change, ...]
+    lost: tuple[str, ...]  # rows that fail now, drives that are no longer localized
+
+    @property
+    def passed(self) -> bool:
+        return not self.lost and not any(change.regressed for change in self.changes)
+
+
+def compare(run: Baseline, baseline: Baseline) -> Verdict:
+    """Hold a run against a baseline. Raises GateError if they do not measure the same things."""
+    now, then = ({cell.key: cell for cell in one.cells} for one in (run, baseline))
+    _require_comparable(now, then)
+    tests = [_test(method, figure, pairs) for (method, figure), pairs in _pairs(now, then).items()]
+    return Verdict(tuple(_judged(tests)), tuple(_lost(now, then)))
+
+
+def _require_comparable(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> None:
+    if missing := sorted(set(then) - set(now)):
+        raise GateError(f"the run lacks {_place(missing[0])} of the baseline; run the same scenarios and seeds, or --update")
+    if extra := sorted(set(now) - set(then)):
+        raise GateError(f"the baseline lacks {_place(extra[0])} of the run; refresh it with --update")
+    for key, cell in now.items():
+        if cell.question != then[key].question:
+            raise GateError(f"{_place(key)}: the scenario has changed since the baseline was made; refresh it with --update")
+        for name in set(cell.figures) & set(then[key].figures):
+            ours, theirs = cell.figures[name].definition, then[key].figures[name].definition
+            if ours != theirs:
+                raise GateError(f"{_place(key)}: {name} is defined as '{ours}' now and was '{theirs}'; refresh it with --update")
+
+
+def _place(key: Key) -> str:
+    scenario, seed, method = key
+    return f"'{scenario}', seed {seed}, '{method}'"
+
+
+Pair = tuple[str, float, float]  # where, before, after
+
+
+def _pairs(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> dict[tuple[str, str], list[Pair]]:
+    """Per method and figure: every scenario and seed in which both have it."""
+    pairs: dict[tuple[str, str], list[Pair]] = {}
+    for (scenario, seed, method), cell in sorted(now.items()):
+        before = then[scenario, seed, method].figures
+        for name in sorted(set(cell.figures) & set(before)):
+            old_m, new_m = (max(figures[name].value, FLOOR_M) for figures in (before, cell.figures))
+            pairs.setdefault((method, name), []).append((f"{scenario}, seed {seed}", old_m, new_m))
+    return pairs
+
+
+def _test(method: str, figure: str, pairs: Sequence[Pair]) -> Change:
+    """One-sided paired t-test on the logarithms of the ratios: a change in per cent, equal for small and large errors."""
+    if len(pairs) < MIN_PAIRS:
+        raise GateError(f"'{method}', {figure}: {len(pairs)} pair(s), the test needs {MIN_PAIRS}; give more seeds or scenarios")
+    before, after = (np.array([pair[side] for pair in pairs]) for side in (1, 2))
+    ratios = np.log(after / before)
+    error = max(float(ratios.std(ddof=1)), REPEATABILITY) / np.sqrt(len(ratios))
+    p_worse = float(student_t.sf(ratios.mean() / error, len(ratios) - 1))
+    worst = pairs[int(np.argmax(ratios))]
+    return Change(
+        method, figure, len(pairs), float(np.exp(np.log(before).mean())), float(np.exp(np.log(after).mean())),
+        bool(np.any(ratios != 0.0)), p_worse, False, f"{worst[0]}: {worst[1]:.3g} to {worst[2]:.3g}",
+    )  # fmt: skip
+
+
+def _judged(tests: Sequence[Change]) -> list[Change]:
+    """Holm's correction for the number of figures that moved at all, and the verdict on each. In the order given.
+
+    Runs are deterministic: a figure that the change does not reach stays the same to the last digit, and is no chance to err.
+    """
+    order = sorted((i for i, test in enumerate(tests) if test.moved), key=lambda i: tests[i].p_worse)
+    corrected, running = [1.0] * len(tests), 0.0
+    for rank, i in enumerate(order):
+        running = max(running, min(1.0, (len(order) - rank) * tests[i].p_worse))
+        corrected[i] = running
+    return [
+        replace(test, p_worse=p_worse, regressed=bool(p_worse < ALPHA and test.ratio > 1.0 + TOLERANCE))
+        for test, p_worse in zip(tests, corrected, strict=True)
+    ]
+
+
+def _lost(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> list[str]:
+    """What no mean shows: rows that fail now and did not, drives that were localized and are not."""
+    lost = []
+    for key in sorted(now):
+        if now[key].failed and not then[key].failed:
+            lost.append(f"{_place(key)}: fails now")
+        if then[key].localized and not now[key].localized:
+            lost.append(f"{_place(key)}: no longer localized")
+    return lost

@@ -1,0 +1,87 @@
+"""What the gate says: a short table, JUnit XML for CI systems, Markdown for a GitHub step summary."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+
+from hippodrome.eval.gate.compare import Change, Verdict
+
+MOVED = 0.005  # half a per cent: below, a figure stands still
+
+
+def print_verdict(verdict: Verdict, limits: Sequence[str], console: Console) -> None:
+    """The figures that moved, and the verdict."""
+    moved = [change for change in verdict.changes if abs(change.ratio - 1.0) > MOVED]
+    if moved:
+        table = Table(title="what moved", title_justify="left")
+        for head in HEADS:
+            table.add_column(head, justify="left" if head in ("method", "figure", "verdict", "worst pair") else "right")
+        for change in moved:
+            table.add_row(*_cells(change), style="red" if change.regressed else "green" if change.ratio < 1.0 else None)
+        console.print(table)
+    for line in (*verdict.lost, *limits):
+        console.print(line, style="red", markup=False, highlight=False)
+    still = len(verdict.changes) - len(moved)
+    outcome = "passed" if verdict.passed and not limits else "FAILED"
+    console.print(f"gate {outcome}: {len(moved)} figure(s) moved, {still} stand still", markup=False, highlight=False)
+
+
+HEADS = ("method", "figure", "before", "after", "change", "p", "verdict", "worst pair")
+
+
+def summary_markdown(verdict: Verdict, limits: Sequence[str]) -> str:
+    """For ``$GITHUB_STEP_SUMMARY``."""
+    lines = [f"### Gate {'passed' if verdict.passed and not limits else 'failed'}", "", f"| {' | '.join(HEADS)} |",
+             f"|{'---|' * len(HEADS)}"]  # fmt: skip
+    lines += [f"| {' | '.join(_escaped(cell) for cell in _cells(change))} |" for change in verdict.changes]
+    lines += ["", *(f"- {_escaped(line)}" for line in (*verdict.lost, *limits))]
+    return "\n".join(lines) + "\n"
+
+
+def junit_xml(verdict: Verdict, limits: Sequence[str]) -> bytes:
+    """One test case for each figure, and one for each loss and each limit that does not hold."""
+    outright = [("lost", line) for line in verdict.lost] + [("limit", line) for line in limits]
+    failures = sum(change.regressed for change in verdict.changes) + len(outright)
+    suite = ElementTree.Element(
+        "testsuite", name="hippodrome gate", tests=str(len(verdict.changes) + len(outright)), failures=str(failures)
+    )
+    for change in verdict.changes:
+        case = ElementTree.SubElement(suite, "testcase", classname=_xml(change.method), name=change.figure)
+        if change.regressed:
+            ElementTree.SubElement(case, "failure", message=_xml(f"{_percent(change)}, p {change.p_worse:.2g}, {change.worst}"))
+    for kind, line in outright:
+        case = ElementTree.SubElement(suite, "testcase", classname=kind, name=_xml(line))
+        ElementTree.SubElement(case, "failure", message=_xml(line))
+    ElementTree.indent(suite)
+    content: bytes = ElementTree.tostring(suite, encoding="utf-8", xml_declaration=True)
+    return content + b"\n"
+
+
+def _cells(change: Change) -> tuple[str, ...]:
+    return (change.method, change.figure, f"{change.before:.3g}", f"{change.after:.3g}", _percent(change),
+            f"{change.p_worse:.2g}", _word(change), change.worst)  # fmt: skip
+
+
+def _word(change: Change) -> str:
+    if change.regressed:
+        return "WORSE"
+    if abs(change.ratio - 1.0) <= MOVED:
+        return "same"
+    return "better" if change.ratio < 1.0 else "worse, not proven"
+
+
+def _percent(change: Change) -> str:
+    return f"{100.0 * (change.ratio - 1.0):+.1f} %"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")
+
+
+def _xml(text: str) -> str:
+    """Without the control characters that XML cannot hold."""
+    return "".join(character if character.isprintable() else " " for character in text)

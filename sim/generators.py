@@ -46,8 +46,9 @@ class Plan:
 
 
 def closest_plan(make: Callable[[int], Plan], sizes: Sequence[int], length_m: float) -> Plan:
-    """The plan of the size whose streets add up closest to ``length_m``; one that is a town before one that is a mere ring."""
-    return min((make(size) for size in sizes), key=lambda plan: (_crossings(plan) < MIN_CROSSINGS, abs(plan.length_m() - length_m)))
+    """The plan of the size whose streets add up closest to ``length_m``; a town with crossings before a mere ring."""
+    plans = [make(size) for size in sizes]
+    return min(plans, key=lambda plan: (_crossings(plan) < MIN_CROSSINGS, abs(plan.length_m() - length_m)))
 
 
 def _crossings(plan: Plan) -> int:

@@ -3,8 +3,9 @@
 import ast
 from pathlib import Path
 
-import hippodrome.core.types
 import pytest
+
+import hippodrome.core.types
 
 ROOT = Path(hippodrome.core.types.__file__).parent.parent
 MAY_IMPORT = {

@@ -23,7 +23,7 @@ CAPTIONS: Final = {  # in the order of the page; {} stands for the method
     "violins": "Distribution of errors (Fig. 3 G–I)",
     "-ape": "APE on the map, {} (Fig. 3 C)",
     "-localization": "Localization error over the second drive, {}",
-    "-neurodynamics": "Frames, grid cells and head direction while the estimate settles, {} (Fig. 4)",
+    "neurodynamics": "Frames, grid cells and head direction while the estimate settles (Fig. 4)",
     "frames": "The mapping drive as the camera sees it",
 }
 

@@ -282,7 +282,7 @@ function startMap(root) {
     size = [stage.clientWidth, stage.clientHeight];
     if (fitted || !view) view = null;
     else view = { ...view, x: view.x + (size[0] - w) / 2, y: view.y + (size[1] - h) / 2 };
-    redraw();
+    draw();
   }
 
   function hover(x, y) {

@@ -226,6 +226,9 @@ def test_runs_in_a_browser_without_a_word_on_the_console(out, tmp_path):
     click = """<script>addEventListener("load", () => setTimeout(() => {
         document.querySelectorAll(".goto")[2].click();
         document.body.dataset.said = document.querySelector(".vertex").textContent;
+        const canvas = document.querySelector("canvas"), pen = canvas.getContext("2d");
+        const bytes = pen.getImageData(0, 0, canvas.width, canvas.height).data;
+        document.body.dataset.drawn = bytes.filter((level, i) => i % 4 === 3 && level > 0).length;
         document.body.dataset.width = document.documentElement.scrollWidth - innerWidth; }, 300));</script>"""
     copy = tmp_path / "copy.html"
     copy.write_text(write_report(out).read_text(encoding="utf-8").replace("</body>", click + "</body>"), encoding="utf-8")
@@ -235,6 +238,7 @@ def test_runs_in_a_browser_without_a_word_on_the_console(out, tmp_path):
     assert 'class="map" data-ready="yes"' in dom
     assert body["data-said"].splitlines() == ["topometric", "vertex 29 at 60.0 s", "APE 29.00 m", "camera frame at 60.0 s"]
     assert int(body["data-width"]) <= 0
+    assert int(body["data-drawn"]) > 1000  # pixels of the map
 
 
 @needs_browser

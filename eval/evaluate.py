@@ -12,7 +12,7 @@ import numpy as np
 
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import CognitiveMap, HippodromeError, StartPose, Trajectory
-from hippodrome.eval.baselines.rivals import rivals
+from hippodrome.eval.baselines.rivals import Rival, rivals
 from hippodrome.eval.localization_score import score_localization
 from hippodrome.eval.map_quality import closures, matched_lane_accuracy, matched_lane_ids, score_closures
 from hippodrome.eval.materials import Materials, Scored, Topometric, file_stem, gather, score_trajectory
@@ -65,8 +65,7 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
             **_counts(semi_metric),
         ),
     ]
-    for rival in rivals(materials, semi_metric.t_s):
-        rows.append(_own_frame_row(rival.method, {rival.method: rival.scored}, truth, **rival.fields))
+    rows += [_rival_row(rival, truth) for rival in rivals(materials, semi_metric.t_s)]
     found: dict[str, Topometric] = {}
     for method, mode in MODES:
         try:
@@ -110,6 +109,12 @@ def _own_frame_row(method: str, scored: Mapping[str, Scored], truth: Trajectory,
     trajectory = scored[method].trajectory
     fits = {f"ape_{fit}": summarize(ape(trajectory, truth, fit)) for fit in ("se2", "sim2")}
     return Row(method=method, **_errors(scored[method]), **fits, **fields)
+
+
+def _rival_row(rival: Rival, truth: Trajectory) -> Row:
+    if rival.scored is None:
+        return Row(method=rival.method, **rival.fields)
+    return _own_frame_row(rival.method, {rival.method: rival.scored}, truth, **rival.fields)
 
 
 def _topometric_row(method: str, topometric: Topometric, recording: Recording, cpu_percent: float) -> Row:

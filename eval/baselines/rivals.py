@@ -21,7 +21,7 @@ from hippodrome.core.mapper import Mapper, MapperConfig
 from hippodrome.core.mapper_attractor import NeuralPose
 from hippodrome.core.place_memory import Recognition
 from hippodrome.core.se2 import interpolate
-from hippodrome.core.types import AttractorStates, CognitiveMap, FloatArray, Observation, Trajectory
+from hippodrome.core.types import AttractorStates, CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
 from hippodrome.eval.baselines.ratslam.system import RatSlam, RatSlamConfig, RatSlamMap
 from hippodrome.eval.materials import Materials, Scored, file_stem, score_trajectory
 from hippodrome.eval.trajectory_io import write_tum
@@ -33,10 +33,10 @@ RATSLAM, NO_ATTRACTOR = "RatSLAM", "semi-metric, no attractor"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rival:
-    """A method in a frame and scale of its own, and the fields of its row."""
+    """A method in a frame and scale of its own, and the fields of its row; one that failed has the cause there, and no score."""
 
     method: str
-    scored: Scored
+    scored: Scored | None
     fields: dict[str, Any]
 
 
@@ -55,7 +55,13 @@ class MapperWithoutAttractor(Mapper):
 
 def rivals(materials: Materials, at_s: FloatArray) -> list[Rival]:
     """Every rival on the mapping drive, sampled at the same instants (N,); maps and trajectories go to the scenario's folder."""
-    return [_ratslam(materials, at_s), _no_attractor(materials)]
+    found = []
+    for method, attempt in ((RATSLAM, _ratslam), (NO_ATTRACTOR, _no_attractor)):
+        try:
+            found.append(attempt(materials, at_s))
+        except HippodromeError as error:
+            found.append(Rival(method, None, {"failure": str(error)}))
+    return found
 
 
 def _ratslam(materials: Materials, at_s: FloatArray) -> Rival:
@@ -67,11 +73,12 @@ def _ratslam(materials: Materials, at_s: FloatArray) -> Rival:
     return _rival(RATSLAM, trajectory, materials, cpu_s, map_bytes=map_bytes, **counts)
 
 
-def _no_attractor(materials: Materials) -> Rival:
+def _no_attractor(materials: Materials, at_s: FloatArray) -> Rival:
     found, cpu_s = map_without_attractor(materials.mapping.observations(), materials.scenario.mapper)
     map_bytes = save_map(materials.folder / f"{file_stem(NO_ATTRACTOR)}.pbstream", found, {"method": NO_ATTRACTOR})
     counts = {"vertices": len(found.t_s), "edges": len(found.edges.source)}
-    return _rival(NO_ATTRACTOR, Trajectory(found.t_s, found.poses), materials, cpu_s, map_bytes=map_bytes, **counts)
+    trajectory = Trajectory(at_s, interpolate(found.t_s, found.poses, at_s))
+    return _rival(NO_ATTRACTOR, trajectory, materials, cpu_s, map_bytes=map_bytes, **counts)
 
 
 def _rival(method: str, trajectory: Trajectory, materials: Materials, cpu_s: float, **fields: Any) -> Rival:

@@ -22,7 +22,8 @@ def rows_of(out):
 def test_every_method_has_a_row_and_every_figure_a_definition(run):
     assert run.status == DONE
     rows = rows_of(run.out)
-    assert set(rows) == {"dead reckoning", "semi-metric", "topometric (paper)", "topometric"}
+    rivals = {"dead reckoning", "RatSLAM", "semi-metric, no attractor"}
+    assert set(rows) == {*rivals, "semi-metric", "topometric (paper)", "topometric"}
     for row in rows.values():
         assert row.failure is None
         assert "alignment" in row.ape.definition

@@ -123,9 +123,10 @@ def test_some_failures_leave_a_row_of_the_others(monkeypatch, tmp_path):
     assert "crashed" in live.runs[0]["failure"]
 
 
-def test_a_tracker_that_cannot_be_installed_has_rows_too(monkeypatch, tmp_path):
-    monkeypatch.setattr(environment, "PACKAGES", ("a-package-that-has-no-name/",))
-    with pytest.raises(NotInstalled, match="installing"):
+@pytest.mark.parametrize(("python", "cause"), [("/bin/false", "exit status 1"), ("/no/such/python", "No such file")])
+def test_a_tracker_that_cannot_be_installed_has_rows_too(monkeypatch, tmp_path, python, cause):
+    monkeypatch.setattr(environment.sys, "executable", python)
+    with pytest.raises(NotInstalled, match=f"virtual environment failed: .*{cause}"):
         ensure_environment(tmp_path / "venv")
     assert [row.failure for row in failed_rows("not run: why")] == ["not run: why"] * 2
 

@@ -7,6 +7,8 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from pydantic import ValidationError
+
 from hippodrome.eval.report_evidence import MapEvidence
 from hippodrome.eval.report_page.files import Picture, ScenarioFiles
 from hippodrome.eval.report_page.markup import Child, Html, data_script, element, joined
@@ -76,9 +78,17 @@ def _failures(scenario: ScenarioResult) -> Html | None:
 
 
 def _failed_limits(scenario: ScenarioResult) -> list[str] | None:
-    configuration = getattr(scenario, "configuration", None) or {}
-    limits = configuration.get("thresholds")
-    return failed_limits(Thresholds.model_validate(limits), scenario) if limits else None
+    limits = _extra(scenario, "configuration").get("thresholds")
+    try:
+        return failed_limits(Thresholds.model_validate(limits), scenario) if limits else None
+    except ValidationError:  # results of another version: their limits may have other names
+        return None
+
+
+def _extra(scenario: ScenarioResult, name: str) -> dict[str, Any]:
+    """A field that results may have beside the agreed ones; empty if it is missing or something else."""
+    value = getattr(scenario, name, None)
+    return value if isinstance(value, dict) else {}
 
 
 def _headline(scenario: ScenarioResult) -> Html:
@@ -136,8 +146,7 @@ def _figure(picture: Picture) -> Html:
 
 def _timings(scenario: ScenarioResult) -> Html | None:
     """CPU times with bars; those of a step have a scale of their own."""
-    timings: dict[str, Any] = getattr(scenario, "timings", None) or {}
-    figures = {name: float(value) for name, value in timings.items() if isinstance(value, int | float)}
+    figures = {name: float(value) for name, value in _extra(scenario, "timings").items() if isinstance(value, int | float)}
     rows: list[Sequence[Child]] = []
     for name, value in figures.items():
         words, unit = _unit_of(name)
@@ -203,7 +212,7 @@ def _command_lines(scenario: ScenarioResult, evidence: MapEvidence | None) -> It
 
 
 def _configuration(scenario: ScenarioResult) -> Html:
-    text = json.dumps(getattr(scenario, "configuration", None) or {}, indent=2, ensure_ascii=False)
+    text = json.dumps(_extra(scenario, "configuration"), indent=2, ensure_ascii=False)
     return scrolling(element("pre", text), "effective configuration")
 
 

@@ -103,7 +103,7 @@ def break_table(scenario: ScenarioResult) -> Html | None:
     rows = [
         [row.method, f"{one.get('first_vertex')}–{one.get('last_vertex')}", _words(one.get("status")), str(one.get("cause"))]
         for row in scenario.rows
-        for one in getattr(row, "breaks", None) or []
+        for one in _dictionaries(getattr(row, "breaks", None))
     ]
     return plain_table(["Method", "Vertices", "Status", "Cause"], rows, "breaks") if rows else None
 
@@ -126,6 +126,11 @@ def _row(scenario: ScenarioResult, method: str) -> Row | None:
 
 def _located(row: Row | None) -> bool:
     return row is not None and row.localization is not None
+
+
+def _dictionaries(value: object) -> list[dict[str, object]]:
+    """What of a field beside the agreed ones has the form that it should have."""
+    return [one for one in value if isinstance(one, dict)] if isinstance(value, list | tuple) else []
 
 
 def _words(status: object) -> str:

@@ -53,8 +53,9 @@ def scenario(name, **fields):
     )  # fmt: skip
     extra = {"configuration": {"note": HOSTILE, "thresholds": {"method": "topometric", "ape_mean_m": 0.4}},
              "timings": {"mapping_cpu_s": 2.0, "topometric: refinement_cpu_s": 1.0}}  # fmt: skip
-    return ScenarioResult(name=name, seed=7, network=Network(generator="rural", edges=10, km=2.0), noise="paper", frames=100,
-                          duration_s=60.0, rows=rows, **{**extra, **fields})  # fmt: skip
+    whole = {"name": name, "seed": 7, "network": Network(generator="rural", edges=10, km=2.0), "noise": "paper", "frames": 100,
+             "duration_s": 60.0, "rows": rows, **extra, **fields}  # fmt: skip
+    return ScenarioResult(**whole)
 
 
 def evidence():
@@ -175,6 +176,13 @@ def test_a_name_that_is_a_path_reads_nothing(out):
 
 def test_needs_results_only(tmp_path):
     write_results(tmp_path / "results.json", Results(scenarios=(scenario("town", timings={}, configuration={}),)))
+    Page(write_report(tmp_path).read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("extra", ["text", 3, [1], {"thresholds": {"method": 1}}, {"thresholds": "x"}, None])
+def test_fields_beside_the_agreed_ones_may_be_anything(tmp_path, extra):
+    rows = (row("topometric", 1.0, breaks=extra),)
+    write_results(tmp_path / "results.json", Results(scenarios=(scenario("a", timings=extra, configuration=extra, rows=rows),)))
     Page(write_report(tmp_path).read_text(encoding="utf-8"))
 
 

@@ -18,7 +18,6 @@ GAIN_SIGMA = 0.05  # prior: cheap gyros are calibrated to a few percent
 BIAS_SIGMA_RADPS = 0.02  # prior: about 1 deg/s
 GEMAN_MCCLURE = 3.0  # sigmas at which a closure has lost three quarters of its weight
 HUBER = 1.5  # sigmas
-STUDENT_T = 3.0  # degrees of freedom of the scale's steps: mostly a slow walk, at times a jump
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +54,7 @@ class PairGroup(Group):
 
 
 def odometry(state: State, visits: Visits, noise: Noise) -> PairGroup:
-    """Components: along, across, heading, log scale (Student-t: it may jump), between each visit and the next (N = S - 1)."""
+    """Components: along, across, heading, log scale, between each visit and the next (N = S - 1)."""
     a, b = state.poses[:-1], state.poses[1:]
     motion, dt = visits.motion[1:], np.diff(visits.t_s)
     seen, metres = between(a, b), np.exp(state.log_scale[:-1])[:, None] * motion[:, :2]
@@ -68,8 +67,6 @@ def odometry(state: State, visits: Visits, noise: Noise) -> PairGroup:
     border[:, 2, 0], border[:, 2, 1] = -motion[:, 2], -dt
     root = 1.0 / noise.step_sigmas(np.hypot(metres[:, 0], metres[:, 1]))
     weight = np.ones_like(residual)
-    weight[:, 3] = (STUDENT_T + 1.0) / (STUDENT_T + (residual[:, 3] * root[:, 3]) ** 2)
-    root = root * np.sqrt(weight)
     return PairGroup(residual * root, here * root[..., None], weight, there * root[..., None], border * root[..., None])
 
 

@@ -12,7 +12,7 @@ SEEDS = (1, 2, 3)
 
 
 def add_gate_command(commands: Any) -> None:
-    """Adds ``gate`` to the parser's ``commands``."""
+    """Adds ``gate`` and ``compare`` to the parser's ``commands``."""
     parser = commands.add_parser("gate", help="compare with a baseline over several seeds", description=_gate.__doc__)
     parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.yaml")
     parser.add_argument("--baseline", type=Path, default=Path("baseline.json"), metavar="FILE", help="default: baseline.json")
@@ -22,6 +22,11 @@ def add_gate_command(commands: Any) -> None:
     parser.add_argument("--out", type=Path, default=Path("out/gate"), metavar="DIR", help="default: out/gate")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the verdict as JUnit XML as well")
     parser.set_defaults(command=_gate)
+
+    pair = commands.add_parser("compare", help="two results side by side", description=_compare.__doc__)
+    pair.add_argument("before", type=Path, metavar="A", help="folder with results.json")
+    pair.add_argument("after", type=Path, metavar="B", help="folder with results.json")
+    pair.set_defaults(command=_compare)
 
 
 def _seeds(text: str) -> tuple[int, ...]:
@@ -40,3 +45,13 @@ def _gate(options: argparse.Namespace) -> int:
 
     passed = gate(options.scenarios, options.seeds, options.baseline, options.update, options.workers, options.out, options.junit)
     return DONE if passed else WORSE
+
+
+def _compare(options: argparse.Namespace) -> int:
+    """Print which figures of B differ from A's; results of different scenarios or metric definitions are refused."""
+    from rich.console import Console
+
+    from hippodrome.eval.gate.two_runs import compare_folders
+
+    compare_folders(options.before, options.after, Console())
+    return DONE

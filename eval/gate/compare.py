@@ -54,12 +54,13 @@ class Verdict:
 def compare(run: Baseline, baseline: Baseline) -> Verdict:
     """Hold a run against a baseline. Raises GateError if they do not measure the same things."""
     now, then = ({cell.key: cell for cell in one.cells} for one in (run, baseline))
-    _require_comparable(now, then)
+    require_comparable(now, then)
     tests = [_test(method, figure, pairs) for (method, figure), pairs in _pairs(now, then).items()]
-    return Verdict(tuple(_judged(tests)), tuple(_lost(now, then)))
+    return Verdict(tuple(_judged(tests)), tuple(lost_cells(now, then)))
 
 
-def _require_comparable(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> None:
+def require_comparable(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> None:
+    """Raise GateError unless both hold the same cells, of the same scenarios and definitions."""
     if missing := sorted(set(then) - set(now)):
         raise GateError(f"the run lacks {_place(missing[0])} of the baseline; run the same scenarios and seeds, or --update")
     if extra := sorted(set(now) - set(then)):
@@ -123,7 +124,7 @@ def _judged(tests: Sequence[Change]) -> list[Change]:
     ]
 
 
-def _lost(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> list[str]:
+def lost_cells(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> list[str]:
     """What no mean shows: rows that fail now and did not, drives that were localized and are not."""
     lost = []
     for key in sorted(now):

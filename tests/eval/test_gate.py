@@ -228,3 +228,19 @@ def test_cells_come_from_measured_rows_only():
                             duration_s=1.0, rows=rows)  # fmt: skip
     (cell,) = baseline_of([Results(scenarios=(result,))]).cells
     assert (cell.method, cell.failed, cell.figures) == ("broken", True, {})
+
+
+def test_compare_shows_what_moved_between_two_folders(tmp_path, capsys):
+    scenario = tmp_path / "a.yaml"
+    scenario.write_text("name: a\n")
+    for name, ape_m in (("one", 0.5), ("two", 0.6), ("same", 0.5)):
+        fake_evaluate(ape_m)([scenario], None, 1, 1, tmp_path / name)
+    assert main(["compare", str(tmp_path / "one"), str(tmp_path / "two")]) == 0
+    said = capsys.readouterr().out
+    assert "+19.6 %" in said and "1 figure(s) moved, 0 stand still" in said
+    assert main(["compare", str(tmp_path / "one"), str(tmp_path / "same")]) == 0
+    assert "0 figure(s) moved, 1 stand still" in capsys.readouterr().out
+    scenario.write_text("name: a\nnoise: harsh\n")
+    fake_evaluate(0.5)([scenario], None, 1, 1, tmp_path / "other")
+    assert main(["compare", str(tmp_path / "one"), str(tmp_path / "other")]) == 2
+    assert "the scenario has changed" in capsys.readouterr().err

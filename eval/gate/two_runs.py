@@ -1,0 +1,69 @@
+"""``hippodrome compare A B``: two results side by side, cell by cell. No test, no verdict: that is the gate's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from hippodrome.eval.gate.baseline import baseline_of
+from hippodrome.eval.gate.compare import lost_cells, require_comparable
+from hippodrome.eval.gate.report import MOVED
+from hippodrome.eval.results import Results, read_results
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One figure of one method on one scenario in both runs."""
+
+    scenario: str
+    seed: int
+    method: str
+    figure: str
+    before: float
+    after: float
+
+    @property
+    def share(self) -> float:
+        """Of the first value; infinite where that was zero and is no longer."""
+        if self.before == 0.0:
+            return 0.0 if self.after == 0.0 else float("inf")
+        return self.after / self.before - 1.0
+
+
+def differences(before: Results, after: Results) -> list[Difference]:
+    """Every figure that both runs have, in the order of scenarios, seeds and methods. Raises GateError if they do not compare."""
+    then, now = ({cell.key: cell for cell in baseline_of([one]).cells} for one in (before, after))
+    require_comparable(now, then)
+    return [
+        Difference(*key, name, then[key].figures[name].value, figure.value)
+        for key, cell in now.items()
+        for name, figure in cell.figures.items()
+        if name in then[key].figures
+    ]
+
+
+def compare_folders(before: Path, after: Path, console: Console) -> None:
+    """Print what moved between two result folders, and what was lost or found outright."""
+    old, new = (read_results(folder / "results.json") for folder in (before, after))
+    found = differences(old, new)
+    moved = [one for one in found if abs(one.share) > MOVED]
+    if moved:
+        console.print(_table(moved))
+    then, now = ({cell.key: cell for cell in baseline_of([one]).cells} for one in (old, new))
+    for line in (*lost_cells(now, then), *(f"{line}, in {before}" for line in lost_cells(then, now))):
+        console.print(line, markup=False, highlight=False)
+    console.print(f"{len(moved)} figure(s) moved, {len(found) - len(moved)} stand still", markup=False, highlight=False)
+
+
+def _table(moved: list[Difference]) -> Table:
+    table = Table()
+    for head in ("scenario", "seed", "method", "figure", "before", "after", "change"):
+        table.add_column(head, justify="right" if head in ("seed", "before", "after", "change") else "left")
+    for one in moved:
+        cells = (one.scenario, str(one.seed), one.method, one.figure, f"{one.before:.3g}", f"{one.after:.3g}",
+                 f"{100.0 * one.share:+.1f} %")  # fmt: skip
+        table.add_row(*cells, style="green" if one.share < 0.0 else "red")
+    return table

@@ -113,5 +113,6 @@ def _say(row: Row) -> None:
     if row.failure is not None or row.ape is None or row.cpu_percent is None or row.map_bytes is None:
         print(f"{row.method}: {row.failure or 'incomplete'}")
         return
+    lost = f", {extra['maps_started']} maps" if (extra := row.model_extra or {}).get("maps_started", 1) > 1 else ""
     print(f"{row.method}: APE {row.ape.mean_m:.2f} m, CPU {row.cpu_percent:.1f} %, map {row.map_bytes / 1e6:.1f} MB, "
-          f"{row.keyframes} keyframes of {row.camera_frames} frames")  # fmt: skip
+          f"{row.keyframes} keyframes of {row.camera_frames} frames{lost}")  # fmt: skip

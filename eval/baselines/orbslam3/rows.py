@@ -73,6 +73,7 @@ def _costs(run: Run, drive: StereoDrive) -> dict[str, Any]:
         "map_bytes": run.figures.map_bytes,
         "camera_frames": run.figures.frames,
         "keyframes": run.keyframes,
+        "maps_started": run.maps_started,
         "tracked_share": run.figures.tracked / run.figures.frames,
         "peak_rss_bytes": run.figures.peak_rss_bytes,
     }

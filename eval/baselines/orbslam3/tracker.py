@@ -26,6 +26,7 @@ from hippodrome.sim.render.camera import CameraSpec
 
 RUNNER = Path(__file__).with_name("runner.py")
 LIMIT_BASE_S, LIMIT_PER_FRAME_S = 180.0, 0.8  # it takes 0.07 s a frame on a free core; ten times that is a hang
+NEW_MAP = "New Map created"  # in the log: at the start, and whenever it gave up looking for where it was
 LEAST_TRACKED = 0.5  # of the frames: below, the run counts as lost
 
 
@@ -77,6 +78,7 @@ class Run:
     live: Trajectory | None = None  # body poses, in the frame of the first one
     final: Trajectory | None = None
     keyframes: int | None = None
+    maps_started: int | None = None  # more than one: it lost its way; maps that never merged lie anywhere to each other
 
 
 def run_tracker(python: Path, vocabulary: Path, drive: StereoDrive, folder: Path, paced: bool = False) -> Run:
@@ -102,12 +104,14 @@ def read_run(folder: Path, camera: CameraSpec) -> Run:
         return Run(folder, f"lost: {figures.tracked} of {figures.frames} frames tracked", figures)
     live, final = (read_camera_tum(folder / f"{name}.tum", camera.forward_m) for name in ("live", "final"))
     keyframes = len(read_camera_tum(folder / "keyframes.tum", camera.forward_m).t_s)
-    return Run(folder, None, figures, live, final, keyframes)
+    maps_started = (folder / "log.txt").read_text(errors="replace").count(NEW_MAP)
+    return Run(folder, None, figures, live, final, keyframes, maps_started)
 
 
 def run_figures(run: Run) -> dict[str, object]:
     """A run in the results file: its folder's name, its failure, its figures."""
-    return {"run": run.folder.name, "failure": run.failure, **(asdict(run.figures) if run.figures else {})}
+    head = {"run": run.folder.name, "failure": run.failure, "maps_started": run.maps_started}
+    return {**head, **(asdict(run.figures) if run.figures else {})}
 
 
 def _execute(python: Path, vocabulary: Path, drive: StereoDrive, folder: Path, paced: bool) -> str | None:

@@ -87,6 +87,12 @@ def test_a_good_run_becomes_two_rows(monkeypatch, tmp_path):
     assert len(live.runs) == 3
 
 
+def test_a_map_begun_anew_is_counted(monkeypatch, tmp_path):
+    done = run(monkeypatch, tmp_path, ending="print('New Map created with 9 points')\nprint('New Map created with 8 points')")
+    assert done.maps_started == 2
+    assert rows([done], DRIVE)[0].maps_started == 2
+
+
 def test_a_finished_run_is_read_back_not_run_again(monkeypatch, tmp_path):
     run(monkeypatch, tmp_path)
     assert run(monkeypatch, tmp_path, ending="raise SystemExit('run again')").failure is None

@@ -28,6 +28,7 @@ from hippodrome.core.types import (
     FloatArray,
     Frame,
     HippodromeError,
+    IntArray,
     LocalizationEstimate,
     LocalizationStatus,
     Observation,
@@ -58,6 +59,8 @@ class Localizer:
             )
         self._config = config
         self._places = localizer_places.places_of(cognitive_map, network, config.lane_sigma_m, config.injection.map_m)
+        gradient, sequence = self._places.bank.kind == "gradient", config.sequence
+        self._spread_floor = sequence.sigma_floor if gradient else sequence.grey_sigma_floor
         self._belief = _unknown(cognitive_map, config)
         self._index = view_search.index_of(self._places.bank, config.search)
         self._filtered: Float32Array = np.zeros(len(self._places.poses_m), dtype=np.float32)
@@ -69,7 +72,9 @@ class Localizer:
         self._support, self._challenge = 0.0, 0.0  # summed margins of the incumbent and the challenger, as far as remembered
         self._sq_map: FloatArray = np.zeros((3, 3))  # error of the map where it was recognised last
         self._mapped = True  # as far as known
+        self._seen = 0.0  # z-score that the believed place has in the views, a running mean; 0: a new fix, none yet
         self._margin, self._cell = 0.0, -1
+        self._weight = 0.0  # of the last look as a witness; 0 before the first
 
     def step(self, observation: Observation) -> LocalizationEstimate:
         """Take one observation in."""
@@ -91,22 +96,42 @@ class Localizer:
         self._query_mean = view_cells.update_query_mean(self._query_mean, descriptor, config.views)
         expected = localizer_places.expected(places, self._filtered, config.search.hypotheses)
         query = descriptor, self._query_mean
+        here = self._here()
+        expected = np.concatenate([expected, here])
         found = view_search.search(places.bank, self._index, expected, query, config.views, config.search)
         self._filtered = self._filter(found)
         self._cell = int(np.argmax(self._filtered))
         self._margin = localizer_places.margin(places, self._filtered, self._cell)
+        first = self._weight == 0.0
+        self._weight = 1.0 if first else min(1.0, self._step_m / config.independent_m)
         self._view_step = view_step.restart(self._view_step)
         self._step_m, self._turned_rad = 0.0, 0.0
         self._support, self._challenge = config.evidence_memory * self._support, config.evidence_memory * self._challenge
         if self._margin >= config.margin and places.usable[self._cell]:
             self._reactivate(self._injection(found))
-        self._mapped = localizer_places.is_mapped(places, self._belief.pose, _sigma_m(self._belief.covariance))
+        self._confirm(found, here)
+
+    def _here(self) -> IntArray:
+        """Cells of the believed place; none without a fix or off the map."""
+        if not self._fixed:
+            return np.zeros(0, dtype=np.int32)
+        return localizer_places.cells_here(self._places, self._belief.pose, _sigma_m(self._belief.covariance))
+
+    def _confirm(self, found: Found, here: IntArray) -> None:
+        """Where the map shows the believed place, the view has to be like it, whatever else it is like."""
+        if not self._fixed:
+            return
+        self._mapped = len(here) > 0 or self._seen == 0.0
+        similarity = found.similarity[np.isin(found.cells, here)]
+        if len(similarity) > 0:
+            z = (float(similarity.max()) - found.mean) / max(found.spread, self._spread_floor)
+            memory = self._config.seen_memory if self._seen != 0.0 else 0.0
+            self._seen = memory * self._seen + (1.0 - memory) * z
 
     def _filter(self, found: Found) -> Float32Array:
         sequence, places = self._config.sequence, self._places
-        floor = sequence.sigma_floor if places.bank.kind == "gradient" else sequence.grey_sigma_floor
         enough = len(places.poses_m) >= sequence.min_cells
-        z = (found.similarity - found.mean) / max(found.spread, floor) if enough else np.zeros_like(found.similarity)
+        z = (found.similarity - found.mean) / max(found.spread, self._spread_floor) if enough else np.zeros_like(found.similarity)
         filtered: Float32Array = localizer_places.propagate(
             self._filtered,
             found.cells,
@@ -138,19 +163,20 @@ class Localizer:
             self._support_incumbent(belief, injection)
         elif belief.challenged and belief.sq_distance(injection, challenger=True) <= gate:
             self._belief = belief.reinforce(injection)
-            self._challenge += self._margin
+            self._challenge += self._weight * self._margin
             if self._challenge >= config.fix_evidence + self._support:
                 self._belief, self._fixed = self._belief.adopt(), True
                 self._support, self._challenge = min(self._challenge, config.fix_evidence), 0.0
-                self._sq_map = self._places.sq_map[self._cell]
+                self._sq_map, self._seen = self._places.sq_map[self._cell], 0.0
         else:
-            self._belief, self._challenge = belief.challenge(injection), self._margin
+            self._belief, self._challenge = belief.challenge(injection), self._weight * self._margin
 
     def _support_incumbent(self, belief: AttractorPose | KalmanPose, injection: Injection) -> None:
         """An outlier within the same place counts as much as a view at the gate: Student's weight, Huber's reason."""
         excess = max(1.0, belief.sq_distance(injection) / self._config.injection.gate)
         self._belief = belief.inject(Injection(injection.pose, excess * injection.covariance))
-        self._support, self._challenge = min(self._support + self._margin, self._config.fix_evidence), 0.0
+        self._support, self._challenge = self._support + self._weight * self._margin, 0.0
+        self._support = min(self._support, self._config.fix_evidence)
         self._sq_map = self._places.sq_map[self._cell]
 
     def _estimate(self, t_s: float) -> LocalizationEstimate:
@@ -172,7 +198,8 @@ class Localizer:
             return LocalizationStatus.UNKNOWN
         if sigma_m >= self._config.lost_sigma_m:
             return LocalizationStatus.LOST
-        if self._challenge >= max(self._config.doubt_evidence, self._support):
+        unseen = self._seen != 0.0 and self._seen < self._config.seen_z and self._config.mode != "paper"
+        if unseen or self._challenge >= max(self._config.doubt_evidence, self._support):
             return LocalizationStatus.DOUBTED
         return LocalizationStatus.LOCALIZED if self._mapped else LocalizationStatus.OFF_MAP
 

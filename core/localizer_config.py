@@ -75,7 +75,10 @@ class LocalizerConfig:
     paper: PaperNetworks = field(default_factory=PaperNetworks)
     margin: float = 1.2  # filtered margin at which a view cell is reactivated: 87 % right on its own
     fix_evidence: float = 4.0  # summed margin of agreeing reactivations that makes a fix or overturns one
+    independent_m: float = 3.0  # looks closer together, as in a slow turn, see nearly the same and count less as witnesses
     doubt_evidence: float = 1.5  # of a challenger, at which "localized" is taken back; the incumbent's own holds against it
+    seen_z: float = 2.0  # z-score of the believed place below which it is not what is seen: 6 where it is, 1 by chance
+    seen_memory: float = 0.8  # of that z-score per look: a lorry ahead or a turn hides a place for some looks
     evidence_memory: float = 0.6  # of either's evidence, per look that does not renew it: like the sequence filter's
     lost_sigma_m: float = 6.0  # "localized" is taken back when the position's standard deviation exceeds this
     lane_sigma_m: float = 0.5  # of a driver about the lane's centre; 0: no lane pull

@@ -87,11 +87,12 @@ def is_same_place(pose_m: FloatArray, other_m: FloatArray) -> bool:
     return math.dist(pose_m[:2], other_m[:2]) < SAME_PLACE_M and turn_rad < LINK_TURN_RAD
 
 
-def is_mapped(places: Places, pose_m: FloatArray, sigma_m: float) -> bool:
-    """Whether a road that leads the way of ``pose_m`` (3,) was mapped there, or may have been for all that is known."""
-    near = places.tree.query_ball_point(pose_m[:2], SAME_PLACE_M + SURE_SIGMAS * sigma_m)
+def cells_here(places: Places, pose_m: FloatArray, sigma_m: float) -> IntArray:
+    """Cells that show the place of ``pose_m`` (3,), or may for all that is known; none: the map does not reach here."""
+    near = np.array(places.tree.query_ball_point(pose_m[:2], SAME_PLACE_M + SURE_SIGMAS * sigma_m), dtype=np.int32)
     turn_rad = np.abs(se2.wrap(places.poses_m[near, 2] - pose_m[2]))
-    return bool((turn_rad < LINK_TURN_RAD).any())
+    same_way: IntArray = near[turn_rad < LINK_TURN_RAD]
+    return same_way
 
 
 def _first_vertex(view_cell: IntArray, cells: int) -> IntArray:

@@ -19,13 +19,13 @@ class SolverConfig:
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     along_sigma_m: tuple[float, ...] = (3.0, 6.0, 12.0, np.inf, np.inf, np.inf, np.inf, np.inf)  # per round: let go slowly
-    inner_iterations: int = 3
+    inner_iterations: int = 2
     reprojection_m: float = 4.0  # arc length that a vertex may slide in one round
     unvouched_weight: float = 1e-6  # of the road where nothing vouches for it: too little to pull, enough to be determined
-    wander_m: float = (
-        0.15  # least lateral wander of a driver inside the lane, which no network shows; passes into the along-track too
-    )
-    wander_rad: float = 0.01
+    survey_sigma_m: float = 0.0  # of the road network itself, per axis; no drive shows it, so whoever knows it must say it
+
+
+WANDER_RAD = 0.01  # a wander of 0.1 m over some 60 m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,9 +72,12 @@ def curvature(line: RouteLine, arc_m: FloatArray, half_m: float = 4.0) -> FloatA
 
 
 def calibrated(covariance: FloatArray, noise: Noise, config: SolverConfig) -> FloatArray:
-    """The formal covariance (S, 4, 4) plus the driver's wander, which is the same over many visits and so never averages out."""
-    wander = max(config.wander_m, noise.lateral_m)
-    return covariance + np.diag([wander**2, wander**2, config.wander_rad**2, 0.0])
+    """The formal covariance (S, 4, 4) plus what never averages out: the driver's wander in the lane, and the network's own error.
+
+    In bends the wander is an along-track error too, so that it is added to both axes.
+    """
+    place = noise.lateral_m**2 + config.survey_sigma_m**2
+    return covariance + np.diag([place, place, WANDER_RAD**2, 0.0])
 
 
 def gauss_newton_step(state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise) -> tuple[State, ChainFactor]:

@@ -4,8 +4,8 @@ A hypothesis is (bin, scale bin) with two carried values: the heading offset bet
 driven length that the bins could not express. Carrying them makes the search exact in length over any number of bins and
 invariant to translation and rotation, at the price that they follow the survivor (as in any particle-like Viterbi).
 
-Beside these there are hypotheses off the network, moved by dead reckoning. They keep their index into the arrays ``off_*`` as a
-negative bin. A route may leave the network where it is well known and come back near where dead reckoning ends.
+Beside these there are hypotheses off the network (``off_network_kernel``). They keep their index into the arrays ``off_*`` as a
+negative bin.
 """
 
 from __future__ import annotations
@@ -17,34 +17,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-# What the callers of a compiled function must keep in order; numba takes tuples, not dataclasses.
-Tables: TypeAlias = tuple[Any, ...]  # reach_start, reach_bin, reach_m, reach_changes, bin heading, bin lane
-Costs: TypeAlias = tuple[
-    float, ...
-]  # heading sigma, its limit, offset gain, half a bin, length sigma, scale step, scale jump, lane change
-OffNetwork: TypeAlias = tuple[Any, ...]  # see ``expand_off``; then leave (nats), per step (nats), spread (nats)
+from hippodrome.core.matching.off_network_kernel import Costs, OffNetwork, Tables, expand_off, leavers, wrap
+
 Survivors: TypeAlias = tuple[Any, ...]  # see ``forward``
 
-_NOWHERE = np.float32(-1e30)
-_MOST_SUCCESSORS = (
-    2048  # of one hypothesis: three scale bins x a few bins x the branches of a junction, or the bins round a place
-)
+_NOWHERE = -1e30
+_MOST_SUCCESSORS = 2048  # of one hypothesis: a few bins x scale bins x branches of a junction, or the bins round a place
 _MOST_OFF = 192  # hypotheses off the network in one step; beyond this the worst gives way
 _SAME_PLACE_M = 4.0  # closer than this, two hypotheses off the network count as one
 _FARTHEST_JUMP = 12  # scale bins: 50 % either way
 _JUMP_SPREAD = 4.0  # nats; only hypotheses this close to the best may jump in scale, and only if they are few
 _MOST_JUMPING = 200
-_KNOWN_LANES = 30  # good hypotheses on more lanes than this: the route is not known, so nothing can be said to leave the network
-
-
-@njit(cache=True, inline="always")
-def wrap(angle: float) -> float:
-    """An angle into [-pi, pi]; the callers' sums lie within a few turns, where this is far quicker than a modulo."""
-    while angle > math.pi:
-        angle -= 2.0 * math.pi
-    while angle < -math.pi:
-        angle += 2.0 * math.pi
-    return angle
 
 
 @njit(cache=True)
@@ -102,49 +85,6 @@ def expand(
 
 
 @njit(cache=True)
-def expand_off(
-    x: float,
-    y: float,
-    away: float,
-    k: int,
-    offset: float,
-    heading: float,
-    tables: Tables,
-    costs: Costs,
-    off: OffNetwork,
-    out: NDArray[Any],
-) -> int:
-    """Bins on which a hypothesis at (x, y) may come back to the network, counted; rows of ``out`` as in ``expand``."""
-    bin_heading, sigma, limit, gain = tables[4], costs[0], costs[1], costs[2]
-    points, cell_start, cell_bin, origin_x, origin_y, cell_m, columns, rows, enter, drift, turn_limit = off[:11]
-    spread = 2.0 + drift * away
-    radius = 2.5 * spread
-    count = 0
-    column_0 = max(int((x - radius - origin_x) / cell_m), 0)
-    column_1 = min(int((x + radius - origin_x) / cell_m), columns - 1)
-    if column_0 > column_1:
-        return 0
-    row_0 = max(int((y - radius - origin_y) / cell_m), 0)
-    row_1 = min(int((y + radius - origin_y) / cell_m), rows - 1)
-    for row in range(row_0, row_1 + 1):
-        for c in range(cell_start[row * columns + column_0], cell_start[row * columns + column_1 + 1]):
-            bin_ = cell_bin[c]
-            gap_sq = (points[bin_, 0] - x) ** 2 + (points[bin_, 1] - y) ** 2
-            turn = wrap(bin_heading[bin_] - heading - offset)
-            if gap_sq > radius * radius or abs(turn) > turn_limit:
-                continue
-            if count == out.shape[0]:
-                return count
-            out[count, 0] = bin_
-            out[count, 1] = k
-            out[count, 2] = -(enter + 0.5 * gap_sq / spread**2 + min(0.5 * (turn / sigma) ** 2, limit))
-            out[count, 3] = wrap(offset + gain * min(max(turn, -3.0 * sigma), 3.0 * sigma))
-            out[count, 4] = 0.0
-            count += 1
-    return count
-
-
-@njit(cache=True)
 def grown(array: NDArray[Any], size: int) -> NDArray[Any]:
     """A copy with room for ``size`` rows, at least doubled."""
     bigger = np.empty(max(size, 2 * array.shape[0]), array.dtype)
@@ -163,35 +103,6 @@ def jump_bar(score: NDArray[Any]) -> float:
 
 
 @njit(cache=True)
-def leavers(
-    begin: int, end: int, bin_: NDArray[Any], score: NDArray[Any], spread: float, lane: NDArray[Any], slot: NDArray[Any]
-) -> NDArray[Any]:
-    """The best survivor on each lane, among those within ``spread`` of the best; none if these are on too many lanes."""
-    best = _NOWHERE
-    for i in range(begin, end):
-        best = max(best, score[i])
-    rows, count = np.empty(_KNOWN_LANES, np.int64), 0
-    known = True
-    for i in range(begin, end):
-        if bin_[i] < 0 or score[i] < best - spread:
-            continue
-        at = slot[lane[bin_[i]]]
-        if at >= 0:
-            if score[i] > score[rows[at]]:
-                rows[at] = i
-        elif count == _KNOWN_LANES:
-            known = False
-            break
-        else:
-            slot[lane[bin_[i]]] = count
-            rows[count] = i
-            count += 1
-    for c in range(count):
-        slot[lane[bin_[rows[c]]]] = -1
-    return rows[:count] if known else rows[:0]
-
-
-@njit(cache=True)
 def forward(
     headings: NDArray[Any],
     step: float,
@@ -204,10 +115,10 @@ def forward(
     enough: int,
     seeds: tuple[Any, ...],
 ) -> Survivors:
-    """Beam search over T headings, of at most about ``most`` survivors a step. It ends early once no more than ``enough`` survive.
+    """Beam search over T headings, at most about ``most`` survivors a step. It ends early once no more than ``enough`` survive.
 
     ``seeds``: bin, scale bin, score, offset, rest of the hypotheses at heading 0; place, metres of those off the network.
-    Returns the survivors of the t <= T steps searched: row_start (t + 1,), bin, scale bin, parent (row), score, offset, rest,
+    Returns the survivors of the t <= T steps searched: row_start (t + 1,), bin, scale bin, parent row, score, offset, rest,
     and of those off the network: place (M, 2), metres driven since they left.
     """
     seed_bin, seed_k, seed_score, seed_offset, seed_rest, seed_place, seed_away = seeds

@@ -76,6 +76,20 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("results", type=Path, metavar="DIR", help="folder with results.json")
     report.set_defaults(command=_report)
 
+    under_stress = commands.add_parser(
+        "stress", help="refinement under errors, over towns and seeds", description=_stress.__doc__
+    )
+    under_stress.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.yaml", help="see scenarios/")
+    under_stress.add_argument("--seeds", type=_seed, nargs="+", default=[1, 2, 3, 4, 5], metavar="N", help="default: 1 2 3 4 5")
+    under_stress.add_argument(
+        "--case", action="append", default=[], dest="cases", metavar="NAME", help="only this case (repeatable)"
+    )
+    under_stress.add_argument(
+        "--workers", type=_positive, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)"
+    )
+    under_stress.add_argument("--out", type=Path, default=Path("out/stress"), metavar="DIR", help="default: out/stress")
+    under_stress.set_defaults(command=_stress)
+
     build = commands.add_parser("map", help="build the semi-metric map of a recording", description=_map.__doc__)
     build.add_argument("recording", type=Path, metavar="RECORDING", help="folder of a recording")
     build.add_argument("--scenario", type=Path, metavar="SCENARIO.yaml", help="take the mapper's settings from this scenario")
@@ -184,6 +198,14 @@ def _report(options: argparse.Namespace) -> int:
     from hippodrome.eval.report import write_report
 
     print(write_report(options.results))
+    return DONE
+
+
+def _stress(options: argparse.Namespace) -> int:
+    """Refine maps from real frames under noise, false closures, survey error and missing roads; a table with the worst cases."""
+    from hippodrome.eval.stress import stress
+
+    stress(options.scenarios, options.seeds, options.cases, options.workers, options.out)
     return DONE
 
 

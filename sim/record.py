@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -31,7 +31,7 @@ from hippodrome.sim.recording import (
 from hippodrome.sim.render.renderer import FrameRenderer
 from hippodrome.sim.scenario import DriveSpec, Scenario
 from hippodrome.sim.scene.build import build_scene
-from hippodrome.sim.self_motion import sense_self_motion
+from hippodrome.sim.self_motion import SelfMotionNoise, sense_self_motion
 from hippodrome.sim.town import build_town
 from hippodrome.sim.types import Drive, Town, TrafficLog
 
@@ -171,6 +171,13 @@ def finish(plan: RecordingPlan) -> Recording:
     drive = _read_drive(folder / "drive.npz")
     tour = {"coverage": round(drive.coverage, 4), "revisit_share": round(drive.revisit_share, 4)}
     return seal(folder, {**plan.content(), "tour": tour}, read_samples(folder / "samples.npz"))
+
+
+def sensed_anew(recording: Recording, noise: SelfMotionNoise, rng: np.random.Generator) -> Recording:
+    """The same drive and frames with another self-motion: what changes is what the odometry says, not where the car was."""
+    drive, samples = _read_drive(recording.folder / "drive.npz"), recording.samples
+    motion = sense_self_motion(drive, 1.0 / float(samples.dt_s[0]), noise, rng)
+    return replace(recording, samples=replace(samples, speed=motion.speed, yaw_rate_radps=motion.yaw_rate_radps))
 
 
 def record(plan: RecordingPlan) -> Recording:

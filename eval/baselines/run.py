@@ -1,4 +1,4 @@
-"""``hippodrome baselines``: Table I with binocular ORB-SLAM3 beside the rest, on the same drive."""
+"""``hippodrome baselines``: Table I with binocular ORB-SLAM3 beside the rest, on the same drive, and Table II of ours."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from hippodrome.eval.baselines.orbslam3.environment import NotInstalled, ensure_
 from hippodrome.eval.baselines.orbslam3.rows import failed_rows, rows
 from hippodrome.eval.baselines.orbslam3.tracker import Run, StereoDrive, run_tracker
 from hippodrome.eval.baselines.orbslam3.training import VocabularyTask, train_vocabulary
+from hippodrome.eval.baselines.sequences import table_two, write_table_two
+from hippodrome.eval.materials import gather
 from hippodrome.eval.paper_rows import quoted_rows
 from hippodrome.eval.pool import Workers, worker_pool
 from hippodrome.eval.results import Results, Row, ScenarioResult, read_results, to_json, write_results
@@ -52,6 +54,8 @@ def run_baselines(options: BaselineOptions) -> None:
         _say(row)
     if options.seconds is None:
         _write_tables(options.out, found)
+        write_table_two(options.out, table_two(gather(scenario, options.out)))
+        print(f"tables: {options.out / 'table1.md'} {options.out / 'table2.md'}")
 
 
 def stereo_scenario(scenario: Scenario) -> Scenario:
@@ -76,7 +80,8 @@ def _orbslam3_rows(scenario: Scenario, options: BaselineOptions) -> list[Row]:
 
 
 def _run(number: int, python: Path, vocabulary: Path, drive: StereoDrive, scenario: Scenario, options: BaselineOptions) -> Run:
-    how = f"{drive.frames}-frames{'-paced' if options.paced else ''}"
+    key = drive.recording.folder.name.rpartition("-")[2]  # another recording, another run: nothing stale is read back
+    how = f"{key}-{drive.frames}-frames{'-paced' if options.paced else ''}"
     folder = options.out / scenario.name / "orb-slam3" / how / f"run-{number}"
     print(f"ORB-SLAM3: run {number + 1} of {options.runs}, {drive.frames:,} stereo pairs", flush=True)
     return run_tracker(python, vocabulary, drive, folder, options.paced)

@@ -28,6 +28,8 @@ def scenario(tmp_path, monkeypatch):
 
     monkeypatch.setattr(run, "evaluate", evaluate)
     monkeypatch.setattr(run, "ensure_environment", ensure_environment)
+    monkeypatch.setattr(run, "gather", lambda scenario, out: None)
+    monkeypatch.setattr(run, "table_two", lambda materials: [])
     path = tmp_path / "hamlet.yaml"
     path.write_text(SCENARIO)
     return path

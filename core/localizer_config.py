@@ -74,7 +74,7 @@ class LocalizerConfig:
     smallest_period_m: float = 97.0  # of the grid modules; half of it must exceed the drift between two injections
     paper: PaperNetworks = field(default_factory=PaperNetworks)
     margin: float = 1.2  # filtered margin at which a view cell is reactivated: 87 % right on its own
-    fix_evidence: float = 4.0  # summed margin of agreeing reactivations that makes a fix or overturns one
+    fix_evidence: float = 5.0  # summed margin that makes a fix or overturns one: looks of margin 2, as in a like street, never do
     independent_m: float = 3.0  # looks closer together, as in a slow turn, see nearly the same and count less as witnesses
     doubt_evidence: float = 1.5  # of a challenger, at which "localized" is taken back; the incumbent's own holds against it
     seen_z: float = 2.0  # z-score of the believed place below which it is not what is seen: 6 where it is, 1 by chance

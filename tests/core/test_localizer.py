@@ -120,6 +120,26 @@ def test_standing_adds_no_doubt_and_no_uncertainty():
     assert np.trace(estimates[-1].covariance[:2, :2]) < 1.5 * np.trace(estimates[0].covariance[:2, :2])
 
 
+def test_a_second_look_from_the_same_spot_is_no_second_witness():
+    observations, _ = drive(PICTURES, np.random.default_rng(11), 137.0, 100.0)
+    still = [replace(observation, speed=0.01, yaw_rate_radps=0.0) for observation in observations]
+    shuffled = [replace(one, frame=observations[1].frame) for one in still if one.frame is not None]
+    assert not any(estimate.localized for estimate in localize(shuffled, MAP, None, LocalizerConfig()))
+
+
+def test_a_place_that_is_not_what_is_seen_is_doubted():
+    localizer = Localizer(MAP, None, LocalizerConfig())
+    observations, _ = drive(PICTURES, np.random.default_rng(11), 137.0, 240.0)
+    for observation in observations[:750]:
+        estimate = localizer.step(observation)
+    assert estimate.localized
+    elsewhere = Pictures(seed=99)  # nothing that is mapped: no challenger, no margin
+    others, _ = drive(elsewhere, np.random.default_rng(12), 377.0, 60.0)
+    statuses = [localizer.step(replace(other, t_s=estimate.t_s + other.t_s)).status for other in others]
+    assert LocalizationStatus.DOUBTED in statuses
+    assert statuses.index(LocalizationStatus.DOUBTED) * 0.8 < 50.0
+
+
 @pytest.mark.parametrize("pose_type", [AttractorPose, KalmanPose])
 def test_an_outlier_in_the_same_place_neither_unseats_nor_drags_the_incumbent(pose_type):
     localizer = Localizer(MAP, None, LocalizerConfig(mode="default" if pose_type is AttractorPose else "kalman"))

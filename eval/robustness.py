@@ -115,7 +115,8 @@ def _sequence(
         errors_m=_errors_after_fix(score),
         false_fixes=score.false_fixes,
         false_share=score.false_fix_share,
-        localized_share=_share_after_fix(score),
+        steps=len(score.localized) - _first_fix(score),
+        declared=int(score.localized.sum()),
         nees=score.mean_nees,
     )
 
@@ -129,9 +130,3 @@ def _errors_after_fix(score: LocalizationScore) -> FloatArray:
     """Errors of the declared steps from the initial localization on."""
     first = _first_fix(score)
     return score.errors_m[first:][score.localized[first:]]
-
-
-def _share_after_fix(score: LocalizationScore) -> float | None:
-    """Share of the steps from the initial localization on that are declared localized."""
-    after = score.localized[_first_fix(score) :]
-    return float(after.mean()) if len(after) else None

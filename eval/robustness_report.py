@@ -36,12 +36,18 @@ class SequenceResult:
     errors_m: FloatArray  # declared steps from the first fix on
     false_fixes: int
     false_share: float  # of the declared steps
-    localized_share: float | None  # of the steps from the first fix on
-    nees: float | None
+    steps: int  # from the first fix on; the declared ones have an error
+    declared: int  # steps of the whole sequence
+    nees: float | None  # mean over the declared steps
 
     @property
     def success(self) -> bool:
         return self.localized_after_m is not None and self.localized_after_m <= WITHIN_M
+
+    @property
+    def localized_share(self) -> float | None:
+        """Of the steps from the first fix on."""
+        return len(self.errors_m) / self.steps if self.steps else None
 
     @property
     def error_mean_m(self) -> float | None:
@@ -59,9 +65,9 @@ class ConditionResult:
         """The row of the table; figures without a sample are None."""
         errors_m = np.concatenate([sequence.errors_m for sequence in self.sequences])
         after_m = [sequence.localized_after_m for sequence in self.sequences if sequence.localized_after_m is not None]
-        shares = [sequence.localized_share for sequence in self.sequences if sequence.localized_share is not None]
+        steps = sum(sequence.steps for sequence in self.sequences)
         means_m = [mean for sequence in self.sequences if (mean := sequence.error_mean_m) is not None]
-        nees = [sequence.nees for sequence in self.sequences if sequence.nees is not None]
+        nees = [(sequence.nees, sequence.declared) for sequence in self.sequences if sequence.nees is not None]
         return {
             "condition": self.name,
             "sequences": len(self.sequences),
@@ -72,8 +78,8 @@ class ConditionResult:
             "localized_after_median_m": float(np.median(after_m)) if after_m else None,
             "localized_after_max_m": max(after_m, default=None),
             "false_sequences": sum(sequence.false_fixes > 0 for sequence in self.sequences),
-            "localized_share": float(np.mean(shares)) if shares else None,
-            "nees": float(np.mean(nees)) if nees else None,
+            "localized_share": len(errors_m) / steps if steps else None,
+            "nees": sum(mean * count for mean, count in nees) / sum(count for _, count in nees) if nees else None,
         }
 
 

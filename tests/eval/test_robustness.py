@@ -81,24 +81,25 @@ def test_sequences_are_spread_evenly_over_the_drive(tmp_path):
         cuts(straight_drive(tmp_path, SEQUENCE_M - 1), 2)
 
 
-def sequence(after_m=10.0, errors_m=(1.0, 3.0), false_fixes=0):
-    found = after_m is not None
-    return SequenceResult((0.0, 0.0, 0.0), after_m, np.array(errors_m), false_fixes, 0.0, 0.9 if found else None, 1.0)
+def sequence(after_m=10.0, errors_m=(1.0, 3.0), false_fixes=0, nees=1.0):
+    steps = 0 if after_m is None else len(errors_m) + 1
+    return SequenceResult((0.0, 0.0, 0.0), after_m, np.array(errors_m), false_fixes, 0.0, steps, len(errors_m), nees)
 
 
 def test_summary_by_hand():
-    result = ConditionResult("fog", (sequence(), sequence(250.0, (8.0,), 2), sequence(None, ())))
+    result = ConditionResult("fog", (sequence(), sequence(250.0, (8.0,), 2, 4.0), sequence(None, (), nees=None)))
     row = result.summary()
     assert row["success_share"] == pytest.approx(1 / 3)
     assert row["error_mean_m"] == 4.0
     assert row["worst_sequence_mean_m"] == 8.0
     assert row["localized_after_median_m"] == 130.0
     assert row["false_sequences"] == 1
-    assert row["localized_share"] == pytest.approx(0.9)
+    assert row["localized_share"] == pytest.approx(3 / 5)  # pooled over steps
+    assert row["nees"] == pytest.approx(2.0)
 
 
 def test_a_condition_without_any_fix_is_a_row_all_the_same(tmp_path, capsys):
-    results = [ConditionResult("same", (sequence(), sequence())), ConditionResult("night", (sequence(None, ()),) * 2)]
+    results = [ConditionResult("same", (sequence(), sequence())), ConditionResult("night", (sequence(None, (), nees=None),) * 2)]
     assert "| night | 0 % | - / - / - | - / - | 0 of 2 | - |" in markdown("town", results)
     report(tmp_path, "town", results)
     written = json.loads((tmp_path / "robustness.json").read_text())

@@ -34,9 +34,8 @@ class Noise:
         return lateral, heading
 
 
-BEND_CUT_M2 = (
-    2.0  # metres off the centreline per 1/m of curvature: a rear axle 2.7 m behind the front one cuts 2.7^2 / 2 = 3.6 at most
-)
+# metres off the centreline per 1/m of curvature; a rear axle 2.7 m behind the front one cuts 2.7^2 / 2 = 3.6 at most
+BEND_CUT_M2 = 2.0
 BEND_SHIFT_M = 1.0  # along-track shift between the bend that is drawn and the one that is driven
 STANDSTILL_M = 0.1  # a step shorter than this is as uncertain as this: quantised motions, gyro noise while standing
 FLOORS = {"along": 0.005, "across": 0.005, "heading": 0.0005, "log_scale": 0.0003, "lateral_m": 0.1, "lane_heading_rad": 0.05}

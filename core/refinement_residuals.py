@@ -12,7 +12,7 @@ import numpy as np
 from hippodrome.core.chain_solver import ChainSystem
 from hippodrome.core.noise_estimation import Noise
 from hippodrome.core.se2 import between, wrap
-from hippodrome.core.types import Edges, FloatArray, IntArray, Visits
+from hippodrome.core.types import Edges, FloatArray, Visits
 
 GAIN_SIGMA = 0.05  # prior: cheap gyros are calibrated to a few percent
 BIAS_SIGMA_RADPS = 0.02  # prior: about 1 deg/s
@@ -107,10 +107,8 @@ def closures(state: State, edges: Edges, noise: Noise) -> PairGroup:
     return PairGroup(residual * root, here * root[..., None], np.repeat(weight[:, None], 3, 1), there * root[..., None], border)
 
 
-def normal_equations(
-    state: State, steps: PairGroup, roads: Group, tied: PairGroup, source: IntArray, target: IntArray
-) -> ChainSystem:
-    """J^T J and -J^T r; the coupling between the two ends of a closure is left out (see ``coupling``)."""
+def normal_equations(state: State, steps: PairGroup, roads: Group, tied: PairGroup, edges: Edges) -> ChainSystem:
+    """J^T J and -J^T r, without the coupling between the two ends of a closure, which lies off the chain."""
     count = len(state.poses)
     diagonal, rhs = _squares(roads.here, roads.residual)
     here, rhs_here = _squares(steps.here, steps.residual)
@@ -119,7 +117,7 @@ def normal_equations(
     diagonal[1:] += there
     rhs[:-1] += rhs_here
     rhs[1:] += rhs_there
-    for index, jacobian in ((source, tied.here), (target, tied.there)):
+    for index, jacobian in ((edges.source, tied.here), (edges.target, tied.there)):
         blocks, sides = _squares(jacobian, tied.residual)
         np.add.at(diagonal, index, blocks)
         np.add.at(rhs, index, sides)

@@ -25,6 +25,7 @@ class SolverConfig:
     survey_sigma_m: float = 0.0  # of the road network itself, per axis; no drive shows it, so whoever knows it must say it
 
 
+MOST_CG_STEPS = 100  # 10-30 are usual; a step cut short is made up for by the next round
 WANDER_RAD = 0.01  # a wander of 0.1 m over some 60 m
 
 
@@ -80,11 +81,12 @@ def calibrated(covariance: FloatArray, noise: Noise, config: SolverConfig) -> Fl
     return covariance + np.diag([place, place, WANDER_RAD**2, 0.0])
 
 
-def gauss_newton_step(state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise) -> tuple[State, ChainFactor]:
+def gauss_newton_step(
+    state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise, tolerance: float = 1e-4
+) -> tuple[State, ChainFactor]:
+    """One step on the weighted squares; ``tolerance`` of the linear solution, relative to its energy."""
     tied = closures(state, edges, noise)
-    system = normal_equations(
-        state, odometry(state, visits, noise), road(state, targets, noise), tied, edges.source, edges.target
-    )
+    system = normal_equations(state, odometry(state, visits, noise), road(state, targets, noise), tied, edges)
     cross = np.einsum("nmi,nmj->nij", tied.here, tied.there)
 
     def couple(x: FloatArray) -> FloatArray:
@@ -93,7 +95,7 @@ def gauss_newton_step(state: State, visits: Visits, edges: Edges, targets: Targe
         np.add.at(product, edges.target, np.einsum("nij,ni->nj", cross, x[edges.source]))
         return product
 
-    step, gyro_step, factor = solve_coupled(system, couple, 1e-4, 100)
+    step, gyro_step, factor = solve_coupled(system, couple, tolerance, MOST_CG_STEPS)
     return moved(state, step, gyro_step), factor
 
 

@@ -148,7 +148,7 @@ def _walk(
     stack: NDArray[Any],
     out: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
 ) -> int:
-    """Fill ``out`` (bin, metres, lane changes) with what lies ahead of ``bin_``; returns the count. If it is empty: counts only."""
+    """Fill ``out`` (bin, metres, lane changes) with what lies ahead of ``bin_``, counted; counts only if ``out`` is empty."""
     out_bin, out_m, out_changes = out
     own = lane[bin_]
     fill = out_bin.shape[0] > 0

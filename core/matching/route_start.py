@@ -97,7 +97,7 @@ def _promising(field: SearchField, anchor: int, config: RouteSearchConfig) -> np
     )
     arguments = kernel_arguments(coarse, field.track.heading_rad[anchor::2])
     starts = _everywhere(coarse.graph, len(log_scale), float(field.track.heading_rad[anchor]))
-    limit = 20 * config.most_survivors
+    limit = 40 * config.most_survivors
     survivors = route_kernel.forward(*arguments, config.coarse_beam_nats, limit, config.coarse_enough, starts)
     through = route_kernel.backward(*arguments, config.margin_nats, survivors)[: len(starts[0])]
     good = (through >= through.max() - config.seed_margin_nats).reshape(coarse.graph.bin_count, len(log_scale))

@@ -17,7 +17,7 @@ class SearchCosts:
     offset_gain: float = 0.1  # share of each heading error that the carried offset takes over: follows a poor gyro's drift
     length_sigma_m: float = 0.4  # of a step, beyond what the carried rest absorbs: corners cut or swung out
     scale_step_nats: float = 3.0  # one bin of scale change in a step: about 1 in 20
-    scale_jump_nats: float = 8.0  # any number of bins at once, as when a visual odometry starts afresh
+    scale_jump_nats: float = 10.0  # any number of bins at once, as when a visual odometry starts afresh: once in 100 km a bin
     lane_change_nats: float = 5.0  # about 1 in 150 steps, once in 750 m
 
 
@@ -43,7 +43,7 @@ class RouteSearchConfig:
     step_m: float = 5.0  # if the drive's brisk speed is the network's usual limit
     scale_bin: float = 0.04  # of log scale
     beam_nats: float = 40.0
-    most_survivors: int = 60_000  # bounds time and memory where a town is too self-similar for the beam to prune
+    most_survivors: int = 30_000  # bounds time and memory where a town is too self-similar for the beam to prune
     costs: SearchCosts = field(default_factory=SearchCosts)
     off_network: OffNetworkCosts = field(default_factory=OffNetworkCosts)
     coarse: int = 4  # coarse bins, of length and of scale, are this many fine bins

@@ -15,7 +15,7 @@ MAY_IMPORT = {
     "eval": {"core", "sim", "proto", "eval"},
 }
 CORE_PACKAGES = {"cv2", "numba", "numpy", "scipy"}
-STANDARD_IN_CORE = {"__future__", "collections", "dataclasses", "enum", "functools", "itertools", "math", "typing"}
+STANDARD_IN_CORE = {"__future__", "collections", "dataclasses", "enum", "functools", "heapq", "itertools", "math", "typing"}
 
 
 def imports(path):

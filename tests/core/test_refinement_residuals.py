@@ -142,7 +142,7 @@ def _gtsam_optimum(visits, edges, targets, state, noise, scale):
 
     def add(keys, error, dimension, robust=None):
         def factor(this, values, jacobians):
-            at = [values.atVector(k) for k in this.keys()]
+            at = [values.atVector(k) for k in this.keys()]  # noqa: SIM118  (a factor, not a dict)
             if jacobians is not None:
                 for n, x in enumerate(at):
                     columns = []

@@ -67,7 +67,7 @@ def test_stops_and_uneven_spacing_change_nothing(town, drive):
 
 
 def test_the_driving_side_is_respected(town, drive):
-    visits, poses, lanes = drive
+    visits, _, lanes = drive
     route = search_route(visits, town, CONFIG)
     nearest = np.clip(np.searchsorted(route.track.visit_arc, route.track.arc), 0, len(lanes) - 1)
     on_road = ~town.is_internal[lanes[nearest]] & ~town.is_internal[route.lane]

@@ -27,9 +27,9 @@ class Noise:
         sigmas: FloatArray = root * np.array([self.along, self.across, self.heading, self.log_scale])
         return sigmas
 
-    def road_sigmas(self, curvature_1pm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def road_sigmas(self, curvature_1pm: FloatArray, freedom_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Sigmas (N,) across the lane and of the lane's heading; bends are cut, and drawn as polylines."""
-        lateral = np.hypot(self.lateral_m, BEND_CUT_M2 * curvature_1pm)
+        lateral = np.hypot(np.hypot(self.lateral_m, freedom_m), BEND_CUT_M2 * curvature_1pm)
         heading = np.hypot(self.lane_heading_rad, BEND_SHIFT_M * curvature_1pm)
         return lateral, heading
 

@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from hippodrome.core.matching.confidence import ConfidenceConfig, breaks, judge
+from hippodrome.core.matching.lane_choice import beside_others, changing, choose_lanes
 from hippodrome.core.matching.route_line import RouteLine, route_line
 from hippodrome.core.matching.route_search import Route, search_route
 from hippodrome.core.matching.search_config import RouteSearchConfig
@@ -46,15 +47,25 @@ def refine_default(
     cognitive_map: CognitiveMap, network: RoadNetwork, config: DefaultRefineConfig, start: StartPose | None = None
 ) -> Refinement:
     """The topometric map, from an unknown start unless one is given."""
-    visits = cognitive_map.visits
+    visits, edges = cognitive_map.visits, closure_edges(cognitive_map)
     route = search_route(visits, network, config.search, start)
     status = visit_status(route, judge(route, config.confidence))
-    line, state_arc = route_line(route, network)
-    arc = np.interp(route.track.visit_arc, route.track.arc, state_arc)
-    log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
     vouched = (status != MatchStatus.OFF_NETWORK).astype(np.float64)
-    solution = optimise(visits, closure_edges(cognitive_map), line, arc, log_scale, vouched, config.solver)
+    log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
+    line, arc = _line(route, network)
+    free = beside_others(line, network)
+    solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
+    if np.any(free):
+        line, arc = _line(choose_lanes(solution.state.poses, vouched > 0.0, network, config.search), network)
+        log_scale, free = solution.state.log_scale, changing(line, network)
+        solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
     return _refinement(cognitive_map, network, line, solution, status)
+
+
+def _line(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArray]:
+    """The route's line, and where each visit lies on it (S,)."""
+    line, state_arc = route_line(route, network)
+    return line, np.interp(route.track.visit_arc, route.track.arc, state_arc)
 
 
 def visit_status(route: Route, sample_status: UInt8Array) -> UInt8Array:

@@ -34,6 +34,7 @@ class Targets:
     points_m: FloatArray  # (S, 2)
     heading_rad: FloatArray  # (S,) of the lane
     curvature_1pm: FloatArray  # (S,) of the lane, without sign
+    freedom_m: FloatArray  # (S,) lateral sigma beyond the driver's, where lanes are parallel
     on_road: FloatArray  # (S,) 1, or 0 where nothing vouches for the road
     along_sigma_m: float  # inf: point to line
 
@@ -74,7 +75,7 @@ def road(state: State, targets: Targets, noise: Noise) -> Group:
     """Components: across the lane and lane heading (Huber), along the lane."""
     cos, sin = np.cos(targets.heading_rad), np.sin(targets.heading_rad)
     off = state.poses[:, :2] - targets.points_m
-    lateral, turned_sigma = noise.road_sigmas(targets.curvature_1pm)
+    lateral, turned_sigma = noise.road_sigmas(targets.curvature_1pm, targets.freedom_m)
     across = (-sin * off[:, 0] + cos * off[:, 1]) / lateral
     along = (cos * off[:, 0] + sin * off[:, 1]) / targets.along_sigma_m
     turned = wrap(state.poses[:, 2] - targets.heading_rad) / turned_sigma

@@ -8,7 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from hippodrome.core.chain_solver import ChainFactor, marginals, solve_coupled
-from hippodrome.core.matching.route_line import RouteLine
+from hippodrome.core.matching.lane_choice import freedom_m
+from hippodrome.core.matching.projection import reproject
+from hippodrome.core.matching.route_line import BoolArray, RouteLine
 from hippodrome.core.noise_estimation import Noise, per_freedom, reestimated
 from hippodrome.core.refinement_residuals import State, Targets, closures, moved, normal_equations, odometry, road
 from hippodrome.core.types import Edges, FloatArray, Visits
@@ -44,11 +46,12 @@ def optimise(
     arc_m: FloatArray,
     log_scale: FloatArray,
     vouched: FloatArray,
+    free: BoolArray,
     config: SolverConfig,
 ) -> Solution:
     """The most likely poses and scales of S visits, from their places ``arc_m`` (S,) on the line.
 
-    ``vouched`` (S,): 1 on this road, 0 not known.
+    ``vouched`` (S,): 1 on this road, 0 not known. ``free`` (P,): where the line's lane may be the wrong one of several.
     """
     points, heading = on_line(line, arc_m)
     state = State(np.column_stack([points, heading]), log_scale, np.zeros(2))
@@ -57,7 +60,7 @@ def optimise(
     for along_sigma_m in config.along_sigma_m:
         arc_m = reproject(line, state.poses[:, :2], arc_m, config.reprojection_m)
         points, heading = on_line(line, arc_m)
-        targets = Targets(points, heading, curvature(line, arc_m), on_road, along_sigma_m)
+        targets = Targets(points, heading, curvature(line, arc_m), freedom_m(line, arc_m, free), on_road, along_sigma_m)
         for _ in range(config.inner_iterations):
             state, factor = gauss_newton_step(state, visits, edges, targets, noise)
         noise = estimate_noise(state, visits, edges, targets, noise, factor)
@@ -114,21 +117,6 @@ def estimate_noise(state: State, visits: Visits, edges: Edges, targets: Targets,
         per_freedom(roads.residual, roads.weight, roads_used),
         float(np.median(plain_sq)) if len(plain_sq) else None,
     )
-
-
-def reproject(line: RouteLine, points_m: FloatArray, arc_m: FloatArray, reach_m: float) -> FloatArray:
-    """Arc length (S,) of the nearest place on the line within ``reach_m`` of the present one."""
-    spacing = (line.arc_m[-1] - line.arc_m[0]) / max(len(line.arc_m) - 1, 1)
-    window = np.arange(-int(np.ceil(reach_m / spacing)), int(np.ceil(reach_m / spacing)) + 1)
-    middle = np.searchsorted(line.arc_m, arc_m)
-    index = np.clip(middle[:, None] + window, 0, len(line.arc_m) - 1)
-    gap = points_m[:, None] - line.points_m[index]
-    best = index[np.arange(len(index)), np.argmin(np.sum(gap**2, axis=2), axis=1)]
-    cos, sin = np.cos(line.heading_rad[best]), np.sin(line.heading_rad[best])
-    off = points_m - line.points_m[best]
-    ahead = np.clip(cos * off[:, 0] + sin * off[:, 1], -spacing, spacing)
-    nearest: FloatArray = line.arc_m[best] + ahead
-    return nearest
 
 
 def on_line(line: RouteLine, arc_m: FloatArray) -> tuple[FloatArray, FloatArray]:

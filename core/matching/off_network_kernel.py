@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 # What the callers of a compiled function must keep in order; numba takes tuples, not dataclasses.
-Tables: TypeAlias = tuple[Any, ...]  # reach_start, reach_bin, reach_m, reach_changes, bin heading, bin lane
+Tables: TypeAlias = tuple[Any, ...]  # reach_start, reach_bin, reach_m, reach_changes, bin heading, bin lane, bin points
 Costs: TypeAlias = tuple[float, ...]  # heading sigma, its limit, gain, half a bin, length sigma, scale step and jump, lane change
 OffNetwork: TypeAlias = tuple[Any, ...]  # see ``expand_off``; then leave (nats), per step (nats), spread (nats)
 

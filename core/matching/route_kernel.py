@@ -42,13 +42,15 @@ def expand(
     tables: Tables,
     costs: Costs,
     jumps: bool,
+    place: tuple[float, float, float],
     out: NDArray[Any],
 ) -> int:
     """Successors of one hypothesis over one step, counted. Rows of ``out``: bin, scale bin, log likelihood, offset, rest.
 
     A bin either side of the predicted length is tried, for corners cut or swung out. ``jumps``: the scale may jump.
+    ``place``: x, y and 1/sigma^2 of where the step is known to end, 0 where it is not.
     """
-    start, reach_bin, reach_m, reach_changes, bin_heading, _ = tables
+    start, reach_bin, reach_m, reach_changes, bin_heading, _, points = tables
     sigma, limit, gain, half, length_sigma, scale_cost, jump_cost, change_cost = costs
     count = 0
     first, last = start[bin_], start[bin_ + 1]
@@ -75,6 +77,9 @@ def expand(
             beyond = max(abs(error) - half, 0.0) / length_sigma
             turn = wrap(bin_heading[reach_bin[r]] - heading - offset)
             cost = 0.5 * beyond * beyond + min(0.5 * (turn / sigma) ** 2, limit) + min(scale_cost * abs(move), jump_cost)
+            if place[2] > 0.0:
+                away_sq = (points[reach_bin[r], 0] - place[0]) ** 2 + (points[reach_bin[r], 1] - place[1]) ** 2
+                cost += min(0.5 * place[2] * away_sq, limit)
             out[count, 0] = reach_bin[r]
             out[count, 1] = k_next
             out[count, 2] = -(cost + change_cost * reach_changes[r])
@@ -105,6 +110,7 @@ def jump_bar(score: NDArray[Any]) -> float:
 @njit(cache=True)
 def forward(
     headings: NDArray[Any],
+    places: NDArray[Any],
     step: float,
     scales: NDArray[Any],
     tables: Tables,
@@ -115,7 +121,9 @@ def forward(
     enough: int,
     seeds: tuple[Any, ...],
 ) -> Survivors:
-    """Beam search over T headings, at most about ``most`` survivors a step. It ends early once no more than ``enough`` survive.
+    """Beam search over T headings and (known) places (T, 3), at most about ``most`` survivors a step.
+
+    It ends early once no more than ``enough`` survive.
 
     ``seeds``: bin, scale bin, score, offset, rest of the hypotheses at heading 0; place, metres of those off the network.
     Returns the survivors of the t <= T steps searched: row_start (t + 1,), bin, scale bin, parent row, score, offset, rest,
@@ -144,10 +152,11 @@ def forward(
         size, best = end, _NOWHERE
         course = 0.5 * (headings[t - 1] + headings[t])
         bar = jump_bar(score[begin:end])
+        place = (places[t, 0], places[t, 1], places[t, 2])
         for i in range(begin, end):
             if bin_[i] >= 0:
                 found = expand(
-                    bin_[i], int(k[i]), offset[i], rest[i], headings[t], step, scales, tables, costs, score[i] >= bar, out
+                    bin_[i], int(k[i]), offset[i], rest[i], headings[t], step, scales, tables, costs, score[i] >= bar, place, out
                 )
             else:
                 j, far = -1 - bin_[i], step * scales[k[i]]
@@ -227,13 +236,24 @@ def forward(
             break
     row_start = row_start[: times + 1]
     size = row_start[times]
-    places = np.stack((off_x[:off_size], off_y[:off_size]), axis=1)
-    return row_start, bin_[:size], k[:size], parent[:size], score[:size], offset[:size], rest[:size], places, off_away[:off_size]
+    off_places = np.stack((off_x[:off_size], off_y[:off_size]), axis=1)
+    return (
+        row_start,
+        bin_[:size],
+        k[:size],
+        parent[:size],
+        score[:size],
+        offset[:size],
+        rest[:size],
+        off_places,
+        off_away[:off_size],
+    )
 
 
 @njit(cache=True)
 def backward(
     headings: NDArray[Any],
+    places: NDArray[Any],
     step: float,
     scales: NDArray[Any],
     tables: Tables,
@@ -243,7 +263,7 @@ def backward(
     survivors: Survivors,
 ) -> NDArray[Any]:
     """Score (rows,) of the best complete route through each survivor; far below any score where none comes within ``margin``."""
-    row_start, bin_, k, parent, score, offset, rest, places, off_away = survivors
+    row_start, bin_, k, parent, score, offset, rest, off_places, off_away = survivors
     times, scale_count = row_start.shape[0] - 1, scales.shape[0]
     through = np.full(bin_.shape[0], _NOWHERE, np.float32)
     through[row_start[times - 1] :] = score[row_start[times - 1] :]
@@ -254,6 +274,7 @@ def backward(
         begin, end = row_start[t + 1], row_start[t + 2]
         course = 0.5 * (headings[t] + headings[t + 1])
         bar = jump_bar(score[row_start[t] : begin])
+        place = (places[t + 1, 0], places[t + 1, 1], places[t + 1, 2])
         for i in range(begin, end):
             if through[i] < best - margin:
                 continue
@@ -264,11 +285,25 @@ def backward(
         for i in range(row_start[t], begin):
             if bin_[i] >= 0:
                 found = expand(
-                    bin_[i], int(k[i]), offset[i], rest[i], headings[t + 1], step, scales, tables, costs, score[i] >= bar, out
+                    bin_[i],
+                    int(k[i]),
+                    offset[i],
+                    rest[i],
+                    headings[t + 1],
+                    step,
+                    scales,
+                    tables,
+                    costs,
+                    score[i] >= bar,
+                    place,
+                    out,
                 )
             else:
                 j, far = -1 - bin_[i], step * scales[k[i]]
-                x, y = places[j, 0] + far * math.cos(course + offset[i]), places[j, 1] + far * math.sin(course + offset[i])
+                x, y = (
+                    off_places[j, 0] + far * math.cos(course + offset[i]),
+                    off_places[j, 1] + far * math.sin(course + offset[i]),
+                )
                 found = expand_off(x, y, off_away[j] + far, int(k[i]), offset[i], headings[t + 1], tables, costs, off, out)
             for c in range(found):
                 at = slot[int(out[c, 0]) * scale_count + int(out[c, 1])]

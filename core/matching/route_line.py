@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hippodrome.core.matching.route_search import Route
 from hippodrome.core.road_geometry import interpolate, road_geometry
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
+
+BoolArray: TypeAlias = NDArray[np.bool_]
 
 SPACING_M = 0.5  # of the line's samples: a polyline's chord over 0.5 m is within a millimetre of any drivable curve
 _CHORD_SAMPLES = 3  # heading over +-1.5 m, as in the lane graph

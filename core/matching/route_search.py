@@ -60,27 +60,28 @@ def search_route(visits: Visits, network: RoadNetwork, config: RouteSearchConfig
     """
     field = search_field(visits, network, config)
     if start is not None:
-        return _route(field, prior_starts(field, start, config), config)
+        return best_route(field, prior_starts(field, start, config), config)
     routes: list[Route] = []
     for anchor in anchors(field.track, config.anchors):
-        routes.append(_route(field, starts_from(field, anchor, config), config))
+        routes.append(best_route(field, starts_from(field, anchor, config), config))
         if routes[-1].explained(config.off_network.step_nats):
             break
     return max(routes, key=lambda route: route.total_nats)
 
 
-def _route(field: SearchField, seeds: Seeds, config: RouteSearchConfig) -> Route:
-    arguments = kernel_arguments(field, field.track.heading_rad)
+def best_route(field: SearchField, seeds: Seeds, config: RouteSearchConfig, places: FloatArray | None = None) -> Route:
+    """The most likely route from given starts; ``places`` (T, 3): x, y, 1/sigma^2 of what is known of the way."""
+    arguments = kernel_arguments(field, field.track.heading_rad, places)
     survivors = route_kernel.forward(*arguments, config.beam_nats, config.most_survivors, 0, seeds)
     if len(survivors[0]) - 1 < len(field.track.arc):
         length_m = field.track.arc[-1] * np.exp(np.mean(field.log_scale))
         raise HippodromeError(
             f"cognitive map: no route of this network is about {length_m:.0f} m long; is it the one that was driven?"
         )
-    return _best_route(field, survivors, route_kernel.backward(*arguments, config.margin_nats, survivors))
+    return _as_route(field, survivors, route_kernel.backward(*arguments, config.margin_nats, survivors))
 
 
-def _best_route(field: SearchField, survivors: tuple[Any, ...], through: Float32Array) -> Route:
+def _as_route(field: SearchField, survivors: tuple[Any, ...], through: Float32Array) -> Route:
     graph, track, log_scale = field.graph, field.track, field.log_scale
     row_start, bins, k, parent, score, offset, rest, places, _ = survivors
     row = np.empty(len(track.arc), dtype=np.int64)

@@ -40,6 +40,7 @@ class KernelArguments(NamedTuple):
     """What both passes of the compiled search take, in its order."""
 
     heading_rad: FloatArray
+    places: FloatArray  # (T, 3) x, y, 1/sigma^2 of what is known of the place at each heading
     step: float
     scales: FloatArray
     tables: tuple[Any, ...]
@@ -47,9 +48,9 @@ class KernelArguments(NamedTuple):
     off: tuple[Any, ...]
 
 
-def kernel_arguments(field: SearchField, heading_rad: FloatArray) -> KernelArguments:
+def kernel_arguments(field: SearchField, heading_rad: FloatArray, places: FloatArray | None = None) -> KernelArguments:
     graph, costs, off = field.graph, field.costs, field.off_network
-    tables = graph.reach_start, graph.reach_bin, graph.reach_m, graph.reach_changes, graph.heading_rad, graph.lane
+    tables = graph.reach_start, graph.reach_bin, graph.reach_m, graph.reach_changes, graph.heading_rad, graph.lane, graph.points_m
     on_road = (
         costs.heading_sigma_rad, costs.heading_limit_nats, costs.offset_gain, 0.5 * field.bin_m, costs.length_sigma_m,
         costs.scale_step_nats, costs.scale_jump_nats, costs.lane_change_nats,
@@ -58,5 +59,11 @@ def kernel_arguments(field: SearchField, heading_rad: FloatArray) -> KernelArgum
     grid = graph.points_m, cells.start, cells.bin, cells.origin_m[0], cells.origin_m[1], cells.size_m, cells.columns, cells.rows
     off_road = off.return_nats, off.drift, off.turn_limit_rad, off.leave_nats, off.step_nats, off.spread_nats
     return KernelArguments(
-        np.ascontiguousarray(heading_rad), field.track.step, np.exp(field.log_scale), tables, on_road, (*grid, *off_road)
+        np.ascontiguousarray(heading_rad),
+        np.zeros((len(heading_rad), 3)) if places is None else places,
+        field.track.step,
+        np.exp(field.log_scale),
+        tables,
+        on_road,
+        (*grid, *off_road),
     )

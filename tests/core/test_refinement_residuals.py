@@ -39,7 +39,7 @@ def problem():
         source, target, seen, np.tile([0.5, 0.25, 0.08], (3, 1)), np.full(3, EdgeKind.CLOSURE, np.uint8), np.ones(3, np.float32)
     )
     points = truth[:, :2] + 0.1 * rng.standard_normal((COUNT, 2))
-    targets = Targets(points, truth[:, 2], np.full(COUNT, 0.02), np.ones(COUNT), 3.0)
+    targets = Targets(points, truth[:, 2], np.full(COUNT, 0.02), np.full(COUNT, 0.1), np.ones(COUNT), 3.0)
     start = State(truth + 0.1 * rng.standard_normal((COUNT, 3)) * [1.0, 1.0, 0.1], np.full(COUNT, 0.6), np.zeros(2))
     return visits, edges, targets, start
 
@@ -118,7 +118,7 @@ def _gtsam_optimum(visits, edges, targets, state, noise, scale):
 
     def road_error(i, component):
         tangent = np.array([np.cos(targets.heading_rad[i]), np.sin(targets.heading_rad[i])])
-        lateral = np.hypot(noise.lateral_m, 2.0 * targets.curvature_1pm[i])
+        lateral = np.sqrt(noise.lateral_m**2 + targets.freedom_m[i] ** 2 + (2.0 * targets.curvature_1pm[i]) ** 2)
         heading = np.hypot(noise.lane_heading_rad, targets.curvature_1pm[i])
 
         def error(a):

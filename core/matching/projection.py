@@ -1,7 +1,7 @@
 """Projection of a driven path onto its route's line, in driving order.
 
 The nearest point alone will not do: on a road driven out and back, vertices near the U-turn would jump to the other lane, the
-line's end would be skipped, and nothing would hold the path lengthwise. So the arc length on the line must also grow as the vehicle drives.
+line's end would be skipped, and nothing would hold the path lengthwise. So the arc length must also grow as the vehicle drives.
 """
 
 from __future__ import annotations

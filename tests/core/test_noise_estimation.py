@@ -41,6 +41,8 @@ def test_sigmas_keep_their_floors_and_closures_their_bounds():
 
 
 def test_bends_are_looser_than_straights():
-    lateral, heading = Noise(lateral_m=0.1, lane_heading_rad=0.05).road_sigmas(np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.0, 2.0]))
+    lateral, heading = Noise(lateral_m=0.1, lane_heading_rad=0.05).road_sigmas(
+        np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.0, 2.0])
+    )
     np.testing.assert_allclose(lateral, [0.1, np.hypot(0.1, 0.2), np.hypot(0.1, 2.0)])
     np.testing.assert_allclose(heading, [0.05, np.hypot(0.05, 0.1), 0.05])

@@ -20,6 +20,7 @@ class Noise:
     lateral_m: float = 0.3  # of the vehicle from the lane's centreline
     lane_heading_rad: float = 0.05  # of the vehicle from the lane's direction
     closure_factor: float = 1.0  # on the closures' own sigmas
+    step_tail: float = 0.25  # 1 / degrees of freedom of the steps' Student-t: 4, heavy tails with a variance; 0: normal
 
     def step_sigmas(self, length_m: FloatArray) -> FloatArray:
         """Sigmas (N, 4) of along, across, heading, log scale over steps of the given lengths."""

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from hippodrome.core.matching.confidence import ConfidenceConfig, breaks, judge
-from hippodrome.core.matching.lane_choice import beside_others, changing, choose_lanes, swinging
+from hippodrome.core.matching.lane_choice import beside_others, changing, choose_lanes
 from hippodrome.core.matching.route_line import RouteLine, route_line
 from hippodrome.core.matching.route_search import Route, search_route
 from hippodrome.core.matching.search_config import RouteSearchConfig
@@ -53,11 +53,11 @@ def refine_default(
     vouched = (status != MatchStatus.OFF_NETWORK).astype(np.float64)
     log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
     line, arc = _line(route, network)
-    beside = beside_others(line, network)
-    solution = optimise(visits, edges, line, arc, log_scale, vouched, beside | swinging(line), config.solver)
-    if np.any(beside):
+    free = beside_others(line, network)
+    solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
+    if np.any(free):
         line, arc = _line(choose_lanes(solution.state.poses, vouched > 0.0, network, config.search), network)
-        log_scale, free = solution.state.log_scale, changing(line, network) | swinging(line)
+        log_scale, free = solution.state.log_scale, changing(line, network)
         solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
     return _refinement(cognitive_map, network, line, solution, status)
 

@@ -57,8 +57,8 @@ class PairGroup(Group):
 def odometry(state: State, visits: Visits, noise: Noise) -> PairGroup:
     """Components: along, across, heading, log scale, between each visit and the next (N = S - 1), Student-t weighted.
 
-    Where the lane is drawn otherwise than driven (lane changes, kinks of imported networks) a few steps are far off. Under a normal
-    density they alone would set the noise of all steps, and a loose scale lets whole roads slide.
+    Where the lane is drawn otherwise than driven (lane changes, kinks of imported networks) a few steps are far off. Under a
+    normal density they alone would set the noise of all steps, and a loose scale lets whole roads slide.
     """
     a, b = state.poses[:-1], state.poses[1:]
     motion, dt = visits.motion[1:], np.diff(visits.t_s)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from hippodrome.core.matching.lane_graph import build_lane_graph
-from hippodrome.core.matching.route_line import SPACING_M, BoolArray, RouteLine
+from hippodrome.core.matching.route_line import BoolArray, RouteLine
 from hippodrome.core.matching.route_search import Route, best_route
 from hippodrome.core.matching.route_start import prior_starts
 from hippodrome.core.matching.search_config import RouteSearchConfig
@@ -20,10 +20,8 @@ from hippodrome.core.matching.track import Track
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import FloatArray, StartPose
 
-PLACE_SIGMA_M = 2.5  # of the first refinement where lanes are parallel: most of a lane
-FREE_M = 4.0  # lateral sigma of more than a lane: the lane that the search happened to choose has no weight
-TIGHT_1PM = 0.25  # curvature over a car's length either way that no car can drive (its radius is 5 m): it swings out ..
-SWING_M = 12.0  # .. for so long either side
+PLACE_SIGMA_M = 1.5  # of the first refinement where lanes are parallel: half a lane
+FREE_M = 2.0  # lateral sigma that leaves the choice of the lane open, and that of a vehicle between two lanes
 CHANGE_M = 15.0  # a lane change takes about this long either side of its middle
 
 
@@ -51,18 +49,6 @@ def changing(line: RouteLine, network: RoadNetwork) -> BoolArray:
     next_ = np.clip(np.searchsorted(changes_m, line.arc_m), 0, len(changes_m) - 1)
     nearest = np.minimum(np.abs(changes_m[next_] - line.arc_m), np.abs(changes_m[np.maximum(next_ - 1, 0)] - line.arc_m))
     near: BoolArray = nearest < CHANGE_M
-    return near
-
-
-def swinging(line: RouteLine) -> BoolArray:
-    """Which samples (P,) lie near a turn too tight to be driven as drawn: U-turns."""
-    samples = max(1, round(4.0 / SPACING_M))
-    heading = np.unwrap(line.heading_rad)
-    index = np.arange(len(heading))
-    ahead, behind = np.minimum(index + samples, len(index) - 1), np.maximum(index - samples, 0)
-    tight = np.abs(heading[ahead] - heading[behind]) > TIGHT_1PM * 2.0 * 4.0
-    reach = round(SWING_M / SPACING_M)
-    near: BoolArray = np.convolve(tight, np.ones(2 * reach + 1), "same") > 0.0
     return near
 
 

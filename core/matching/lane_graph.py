@@ -17,8 +17,6 @@ from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import Float32Array, FloatArray, IntArray, UInt8Array
 
 _CHORD_M = 1.5  # half the chord that a bin's heading is taken over: SUMO's curves are polylines with joints 1-5 m apart
-_U_TURN_RAD = 2.5  # a lane that turns more than this, inside a junction, is a U-turn ..
-_TURNING_RADIUS_M = 5.0  # .. which a car drives at this radius, however tightly it is drawn
 _MAX_STACK = 4096  # open branches while walking ahead of one bin; a junction of 6 roads x 3 lanes stays below 100
 
 
@@ -50,12 +48,11 @@ def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 
     lane = np.repeat(np.arange(network.lane_count, dtype=np.int32), counts)
     order = np.arange(len(lane)) - lane_start[lane]
     position = (order + 0.5) * (lengths / counts)[lane]
-    stretch = _u_turn_stretch(network, lengths)
     tables = _reach_tables(
         lane,
-        position * stretch[lane],
+        position,
         lane_start,
-        lengths * stretch,
+        lengths,
         network.successor,
         network.successor_start,
         (network.left_lane, network.right_lane),
@@ -117,17 +114,6 @@ def bin_cells(graph: LaneGraph, size_m: float = 10.0) -> BinCells:
     order = np.argsort(number, kind="stable").astype(np.int32)
     start = np.searchsorted(number[order], np.arange(rows * columns + 1)).astype(np.int32)
     return BinCells(start, order, (float(low[0]), float(low[1])), size_m, columns, rows)
-
-
-def _u_turn_stretch(network: RoadNetwork, lengths_m: FloatArray) -> FloatArray:
-    """By how much (L,) a car's way is longer than the lane as drawn: 1, but for U-turns tighter than a car can drive."""
-    first = network.points_m[network.point_start[:-1] + 1] - network.points_m[network.point_start[:-1]]
-    last = network.points_m[network.point_start[1:] - 1] - network.points_m[network.point_start[1:] - 2]
-    cross = first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0]
-    turn = np.abs(np.arctan2(cross, np.sum(first * last, axis=1)))
-    u_turn = network.is_internal & (turn > _U_TURN_RAD)
-    stretch: FloatArray = np.where(u_turn, np.maximum(1.0, turn * _TURNING_RADIUS_M / lengths_m), 1.0)
-    return stretch
 
 
 def _points_at(network: RoadNetwork, lane: IntArray, position_m: FloatArray) -> FloatArray:

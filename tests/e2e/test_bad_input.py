@@ -2,7 +2,8 @@
 
 import pytest
 
-from hippodrome.eval.cli import BAD_INPUT, main
+from hippodrome.eval.cli import main
+from hippodrome.eval.commands.arguments import BAD_INPUT
 
 SCENARIO = "name: tiny\ntown: {kind: grid, width_m: 150, height_m: 150, road_km: 0.8}\n"
 

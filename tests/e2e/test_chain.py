@@ -7,7 +7,8 @@ import pytest
 
 from hippodrome.core.mapper import MapperConfig
 from hippodrome.core.types import EdgeKind
-from hippodrome.eval.cli import DONE, THRESHOLD_FAILED, main
+from hippodrome.eval.cli import main
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED
 from hippodrome.eval.metrics import ape
 from hippodrome.eval.results import read_results, to_json, without_timings
 from hippodrome.eval.stages import map_recording

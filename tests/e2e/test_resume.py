@@ -6,7 +6,8 @@ import subprocess
 import sys
 import time
 
-from hippodrome.eval.cli import DONE, main
+from hippodrome.eval.cli import main
+from hippodrome.eval.commands.arguments import DONE
 
 
 def recorded_bytes(out):

@@ -6,7 +6,8 @@ import pytest
 
 from hippodrome.eval.baselines import run
 from hippodrome.eval.baselines.orbslam3.environment import NotInstalled
-from hippodrome.eval.cli import BAD_INPUT, DONE, main
+from hippodrome.eval.cli import main
+from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
 from hippodrome.eval.results import Network, Results, Row, ScenarioResult, read_results, write_results
 
 SCENARIO = "name: hamlet\ntown: {kind: grid, width_m: 150, height_m: 150, road_km: 0.9}\nmapping: {tour: {length_m: 120}}\n"

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 from typing import Any
 
-DONE, WORSE = 0, 1
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_out, add_workers
+
 SEEDS = (1, 2, 3)
 
 
-def add_gate_command(commands: Any) -> None:
+def add_gate_commands(commands: Any) -> None:
     """Adds ``gate`` and ``compare`` to the parser's ``commands``."""
     parser = commands.add_parser("gate", help="compare with a baseline over several seeds", description=_gate.__doc__)
     parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.yaml")
     parser.add_argument("--baseline", type=Path, default=Path("baseline.json"), metavar="FILE", help="default: baseline.json")
     parser.add_argument("--seeds", type=_seeds, default=SEEDS, metavar="1,2,3", help="default: 1,2,3")
     parser.add_argument("--update", action="store_true", help="make this run the baseline instead of comparing with it")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)")
-    parser.add_argument("--out", type=Path, default=Path("out/gate"), metavar="DIR", help="default: out/gate")
+    add_workers(parser)
+    add_out(parser, "out/gate")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the verdict as JUnit XML as well")
     parser.set_defaults(command=_gate)
 
@@ -44,7 +44,7 @@ def _gate(options: argparse.Namespace) -> int:
     from hippodrome.eval.gate.run import gate
 
     passed = gate(options.scenarios, options.seeds, options.baseline, options.update, options.workers, options.out, options.junit)
-    return DONE if passed else WORSE
+    return DONE if passed else THRESHOLD_FAILED
 
 
 def _compare(options: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-DONE, BAD_INPUT = 0, 2
+from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
 
 
 def add_scenario_command(commands: Any) -> None:

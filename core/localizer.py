@@ -14,17 +14,17 @@ from typing import TypeAlias
 
 import numpy as np
 
-from hippodrome.core import localizer_places, view_cells, view_search, view_step
+from hippodrome.core import localizer_places, view_step
 from hippodrome.core.localizer_attractor import AttractorPose
 from hippodrome.core.localizer_config import Injection, LocalizerConfig
 from hippodrome.core.localizer_kalman import KalmanPose
 from hippodrome.core.localizer_motion import Motion
 from hippodrome.core.localizer_paper import PaperPose
 from hippodrome.core.localizer_places import is_same_place
+from hippodrome.core.place_recogniser import PlaceRecogniser, Recognised
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import (
     CognitiveMap,
-    Float32Array,
     FloatArray,
     Frame,
     HippodromeError,
@@ -59,12 +59,8 @@ class Localizer:
             )
         self._config = config
         self._places = localizer_places.places_of(cognitive_map, network, config.lane_sigma_m, config.injection.map_m)
-        gradient, sequence = self._places.bank.kind == "gradient", config.sequence
-        self._spread_floor = sequence.sigma_floor if gradient else sequence.grey_sigma_floor
         self._belief = _unknown(cognitive_map, config)
-        self._index = view_search.index_of(self._places.bank, config.search)
-        self._filtered: Float32Array = np.zeros(len(self._places.poses_m), dtype=np.float32)
-        self._query_mean = view_cells.start_query_mean(self._places.bank.mean, config.mean_trust)
+        self._recogniser = PlaceRecogniser(self._places, config)
         self._view_step = view_step.start()
         self._step_m, self._turned_rad = 0.0, 0.0  # since the last look
         self._fixed = False  # an incumbent has been adopted
@@ -91,25 +87,17 @@ class Localizer:
         self._turned_rad += turned_rad
 
     def _look(self, frame: Frame) -> None:
-        config, places = self._config, self._places
-        descriptor = view_cells.describe(frame, config.views)
-        self._query_mean = view_cells.update_query_mean(self._query_mean, descriptor, config.views)
-        expected = localizer_places.expected(places, self._filtered, config.search.hypotheses)
-        query = descriptor, self._query_mean
-        here = self._here()
-        expected = np.concatenate([expected, here])
-        found = view_search.search(places.bank, self._index, expected, query, config.views, config.search)
-        self._filtered = self._filter(found)
-        self._cell = int(np.argmax(self._filtered))
-        self._margin = localizer_places.margin(places, self._filtered, self._cell)
+        config, here = self._config, self._here()
+        seen = self._recogniser.look(frame, self._step_m, self._turned_rad, here)
+        self._cell, self._margin = seen.cell, seen.margin
         first = self._weight == 0.0
         self._weight = 1.0 if first else min(1.0, self._step_m / config.independent_m)
         self._view_step = view_step.restart(self._view_step)
         self._step_m, self._turned_rad = 0.0, 0.0
         self._support, self._challenge = config.evidence_memory * self._support, config.evidence_memory * self._challenge
-        if self._margin >= config.margin and places.usable[self._cell]:
-            self._reactivate(self._injection(found))
-        self._confirm(found, here)
+        if self._margin >= config.margin and self._places.usable[self._cell]:
+            self._reactivate(self._injection(seen))
+        self._confirm(seen.found, here)
 
     def _here(self) -> IntArray:
         """Cells of the believed place; none without a fix or off the map."""
@@ -124,30 +112,12 @@ class Localizer:
         self._mapped = len(here) > 0 or self._seen == 0.0
         similarity = found.similarity[np.isin(found.cells, here)]
         if len(similarity) > 0:
-            z = (float(similarity.max()) - found.mean) / max(found.spread, self._spread_floor)
+            z = float(self._recogniser.z_score(found, float(similarity.max())))
             memory = self._config.seen_memory if self._seen != 0.0 else 0.0
             self._seen = memory * self._seen + (1.0 - memory) * z
 
-    def _filter(self, found: Found) -> Float32Array:
-        sequence, places = self._config.sequence, self._places
-        enough = len(places.poses_m) >= sequence.min_cells
-        z = (found.similarity - found.mean) / max(found.spread, self._spread_floor) if enough else np.zeros_like(found.similarity)
-        filtered: Float32Array = localizer_places.propagate(
-            self._filtered,
-            found.cells,
-            z.astype(np.float32),
-            (places.link_start, places.link_from, places.link_length_m, places.link_turn_rad),
-            (self._step_m, self._turned_rad),
-            (self._config.step_tolerance_m, sequence.turn_tolerance_rad),
-            np.float32(sequence.memory),
-        )
-        return filtered
-
-    def _injection(self, found: Found) -> Injection:
-        similarity = np.full(len(self._places.poses_m), np.nan, dtype=np.float32)
-        similarity[found.cells] = found.similarity
-        noise = self._config.injection
-        pose = localizer_places.interpolated_pose(self._places, similarity, self._cell)
+    def _injection(self, seen: Recognised) -> Injection:
+        noise, pose = self._config.injection, self._recogniser.pose(seen)
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         return Injection(pose, turn @ np.diag([noise.along_m**2, noise.across_m**2, noise.heading_rad**2]) @ turn.T)

@@ -14,7 +14,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from hippodrome.core import localizer_places, view_step
+from hippodrome.core import gyro_noise, localizer_places, view_step
+from hippodrome.core.gyro_noise import GyroNoise
 from hippodrome.core.localizer_attractor import AttractorPose
 from hippodrome.core.localizer_config import Injection, LocalizerConfig
 from hippodrome.core.localizer_kalman import KalmanPose
@@ -62,6 +63,7 @@ class Localizer:
         self._belief = _unknown(cognitive_map, config)
         self._recogniser = PlaceRecogniser(self._places, config)
         self._view_step = view_step.start()
+        self._gyro = GyroNoise()
         self._step_m, self._turned_rad = 0.0, 0.0  # since the last look
         self._fixed = False  # an incumbent has been adopted
         self._evidence = 0.0  # mode "paper": summed margins so far
@@ -82,7 +84,10 @@ class Localizer:
     def _move(self, observation: Observation) -> None:
         travelled, turned_rad = observation.speed * observation.dt_s, observation.yaw_rate_radps * observation.dt_s
         self._view_step = view_step.advance(self._view_step, observation, self._config.steps)
-        self._belief = self._belief.predict(Motion(travelled, turned_rad, observation.dt_s))
+        least_radps = self._config.motion.gyro_rad_per_sqrt_s / math.sqrt(observation.dt_s)
+        self._gyro = gyro_noise.update(self._gyro, observation.yaw_rate_radps, least_radps)
+        walk = self._gyro.sigma_radps * math.sqrt(observation.dt_s)
+        self._belief = self._belief.predict(Motion(travelled, turned_rad, observation.dt_s, walk))
         self._step_m += travelled * math.exp(self._belief.log_scale)
         self._turned_rad += turned_rad
 

@@ -21,8 +21,8 @@ class MotionNoise:
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
     speed: float = 0.03  # relative, white, per square root of a second
-    gyro_rad_per_sqrt_s: float = 0.005  # angle random walk, 0.3 deg per sqrt(s)
-    gyro_gain: float = 0.02  # share of the turned angle
+    gyro_rad_per_sqrt_s: float = 0.002  # angle random walk at least, 0.1 deg per sqrt(s); more where the signal shows more
+    gyro_gain: float = 0.01  # share of the turned angle
     scale_prior: float = 0.3  # sigma of ln(metres per unit) of this drive about the map's: two drives' spreads of 0.2
     scale_walk_per_sqrt_m: float = 0.004  # ln(scale) wanders 4 % in 100 m
 
@@ -34,7 +34,7 @@ class InjectionNoise:
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
     along_m: float = 1.2  # best match among views 5 m apart, parabola between them, 0.7 m; consecutive errors correlate
-    across_m: float = 0.5  # two drivers' wander inside a lane, correlated over tens of metres
+    across_m: float = 0.4  # two drivers' wander inside a lane, 0.2 to 0.5 m, correlated over tens of metres
     heading_rad: float = 0.05
     map_m: float = 0.4  # along the road, beyond what the map's covariance says: that takes self-motion's errors for white
     gate: float = 12.0  # squared Mahalanobis distance beyond which an injection conflicts (3 dof: 99.3 %)
@@ -69,7 +69,7 @@ class LocalizerConfig:
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
     motion: MotionNoise = field(default_factory=MotionNoise)
     injection: InjectionNoise = field(default_factory=InjectionNoise)
-    head: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=1e4))  # sigma 0.01 rad at best
+    head: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=4e4))  # sigma 0.005 rad at best
     grid: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=1e4))  # sigma 0.15 m at best
     smallest_period_m: float = 97.0  # of the grid modules; half of it must exceed the drift between two injections
     paper: PaperNetworks = field(default_factory=PaperNetworks)

@@ -24,6 +24,7 @@ class Motion:
     travelled: float  # map units of this drive
     turned_rad: float
     dt_s: float
+    gyro_rad_per_sqrt_s: float = 0.0  # what the signal itself shows of its noise
 
 
 def predicted_covariance(
@@ -36,7 +37,8 @@ def predicted_covariance(
     transition[0, 3], transition[1, 3] = along
     grown: FloatArray = transition @ covariance @ transition.T
     grown[:2, :2] += noise.speed**2 / motion.dt_s * np.outer(along, along)
-    grown[2, 2] += noise.gyro_rad_per_sqrt_s**2 * motion.dt_s + (noise.gyro_gain * motion.turned_rad) ** 2
+    walk = max(noise.gyro_rad_per_sqrt_s, motion.gyro_rad_per_sqrt_s)
+    grown[2, 2] += walk**2 * motion.dt_s + (noise.gyro_gain * motion.turned_rad) ** 2
     grown[3, 3] += noise.scale_walk_per_sqrt_m**2 * math.hypot(*along)
     return grown
 

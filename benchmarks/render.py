@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.table import Row
 from hippodrome.core.types import FloatArray, Frame
 from hippodrome.sim.render.camera import FAR_M, CameraSpec, camera_position_m, camera_to_world, projection
-from hippodrome.sim.render.flat import FRAGMENT_SHADER, VERTEX_DTYPE, VERTEX_SHADER, visible_tiles
+from hippodrome.sim.render.flat import VERTEX_DTYPE, VERTEX_SHADER, fragment_shader, visible_tiles
 from hippodrome.sim.render.gl import pyrender
 from hippodrome.sim.render.renderer import FINE_DETAIL_M, FrameRenderer
 from hippodrome.sim.scene.build import build_scene
@@ -120,7 +120,7 @@ def _moderngl(scene: Scene, camera: CameraSpec, poses: FloatArray) -> tuple[floa
     import moderngl
 
     context = moderngl.create_context(standalone=True, backend="egl")
-    program = context.program(vertex_shader=VERTEX_SHADER, fragment_shader=FRAGMENT_SHADER)
+    program = context.program(vertex_shader=VERTEX_SHADER, fragment_shader=fragment_shader(camera.grain))
     # No glDepthRange here: the dome is drawn just inside the far plane instead.
     far_sky = replace(
         scene.sky, vertices_m=scene.sky.vertices_m * np.float32(0.97 * FAR_M / DOME_RADIUS_M)
@@ -160,7 +160,7 @@ def _moderngl(scene: Scene, camera: CameraSpec, poses: FloatArray) -> tuple[floa
 
 def _vertex_array(context, program, tile: Tile):  # type: ignore[no-untyped-def]
     vertices = np.zeros(len(tile.vertices_m), dtype=VERTEX_DTYPE)
-    vertices["position"], vertices["colour"][:, :3] = tile.vertices_m, tile.rgb
+    vertices["position"], vertices["colour"][:, :3], vertices["colour"][:, 3] = tile.vertices_m, tile.rgb, tile.grain
     buffers = context.buffer(vertices.tobytes()), context.buffer(tile.faces.astype(np.uint32).tobytes())
     return context.vertex_array(program, [(buffers[0], "3f 4f1", "position", "colour")], index_buffer=buffers[1])
 

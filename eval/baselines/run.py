@@ -27,7 +27,8 @@ from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario
 
 ORBSLAM3_RESULTS = "orb-slam3.json"
-STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5}  # the size and about the baseline of the published car data sets
+# The size and about the baseline of the published car data sets. Without grain most of a street's surface has no corner to track.
+STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5, "grain": True}
 
 
 @dataclass(frozen=True, slots=True)

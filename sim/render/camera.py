@@ -23,6 +23,7 @@ class CameraSpec(Spec):
     forward_m: float = Field(default=1.6, ge=-5.0, le=10.0)  # from the rear axle to the windscreen
     yaw_offset_deg: float = Field(default=0.0, ge=-180.0, le=180.0)  # counter-clockwise, a camera mounted askew
     supersample: int = Field(default=2, ge=1, le=8)  # rendered at this multiple, averaged down: thin lane lines need it
+    grain: bool = False  # draw the grain of asphalt, plaster, grass, leaves: corners for trackers that live on them
     stereo_baseline_m: float | None = Field(default=None, gt=0.0, le=2.0)
 
     def focal_px(self) -> float:

@@ -23,23 +23,46 @@ uniform mat4 clip_from_world;
 uniform vec3 eye;
 uniform vec3 shift;
 out vec3 ray;
-out vec3 base;
+out vec4 base;
+out vec3 speck;
+const mat3 ASKEW = mat3(0.48, 0.64, -0.60, -0.80, 0.60, 0.0, 0.36, 0.48, 0.80);
 void main() {
     vec3 world = position + shift;
     ray = world - eye;
-    base = colour.rgb;
+    base = colour;
+    speck = ASKEW * world;
     gl_Position = clip_from_world * vec4(world, 1.0);
 }
 """
 # Koschmieder's law: contrast falls as exp(-extinction * distance) towards the haze colour.
 FRAGMENT_SHADER = """#version 330 core
 in vec3 ray;
-in vec3 base;
+in vec4 base;
+in vec3 speck;
 uniform vec3 haze;
 uniform float extinction;
 out vec4 pixel;
+GRAINED
 void main() {
-    pixel = vec4(mix(haze, base, exp(-extinction * length(ray))), 1.0);
+    pixel = vec4(mix(haze, grained(), exp(-extinction * length(ray))), 1.0);
+}
+"""
+SMOOTH = "vec3 grained() { return base.rgb; }"
+# Solid texture (Perlin 1985, Peachey 1985): cells of three sizes, each with a tone hashed from where it is, cut by whatever
+# surface lies there. The lattice is askew, so that walls and ground cut it into uneven shapes. What is finer than a pixel fades.
+GRAIN = """
+const float CELL_M[3] = float[](0.07, 0.25, 0.9);
+float tone(vec3 cell) {
+    ivec3 c = ivec3(floor(cell));
+    uint h = uint(c.x) * 73856093u ^ uint(c.y) * 19349663u ^ uint(c.z) * 83492791u;
+    h = (h ^ (h >> 15)) * 2246822519u;
+    return float((h >> 16) & 65535u) / 32767.5 - 1.0;
+}
+vec3 grained() {
+    float pixel_m = length(fwidth(speck));
+    float grain = 0.0;
+    for (int i = 0; i < 3; ++i) grain += clamp(1.5 - pixel_m / CELL_M[i], 0.0, 1.0) * tone(speck / CELL_M[i]);
+    return clamp(base.rgb * (1.0 + base.a * grain), 0.0, 1.0);
 }
 """
 UNIFORMS = ("clip_from_world", "eye", "shift", "haze", "extinction")
@@ -82,6 +105,7 @@ class FlatPrimitive(pyrender.Primitive):  # type: ignore[misc]  # pyrender is un
         vertices = np.zeros(len(self.tile.vertices_m), dtype=VERTEX_DTYPE)
         vertices["position"] = self.tile.vertices_m
         vertices["colour"][:, :3] = self.tile.rgb
+        vertices["colour"][:, 3] = self.tile.grain
         faces = np.ascontiguousarray(self.tile.faces, dtype=np.uint32)
         gl.glBindVertexArray(self._vaid)
         gl.glBindBuffer(gl.GL_ARRAY_BUFFER, self._buffers[0])
@@ -105,12 +129,14 @@ class LevelCamera(pyrender.Camera):  # type: ignore[misc]  # pyrender is untyped
 class FlatRenderer(pyrender.renderer.Renderer):  # type: ignore[misc]  # pyrender is untyped
     """Draws the tiles of ``pyrender.Scene`` front to back; tells tiles, moving things and the sky apart by the node's name."""
 
-    def __init__(self, width: int, height: int, haze: FloatArray, extinction_per_m: float, fine_range_m: float) -> None:
+    def __init__(
+        self, width: int, height: int, haze: FloatArray, extinction_per_m: float, fine_range_m: float, grain: bool
+    ) -> None:
         self._main_fb: int | None
         super().__init__(width, height)
         self.haze, self.extinction_per_m, self.fine_range_m = haze, extinction_per_m, fine_range_m
         self._program: int | None
-        self._program, self._uniform = _compile()
+        self._program, self._uniform = _compile(fragment_shader(grain))
         self._pixels = np.empty((height, width, 4), dtype=np.uint8)  # filled anew by every frame
         self._tiles: list[FlatPrimitive] = []
         self._bounds_m = np.zeros((0, 4))
@@ -214,11 +240,16 @@ def visible_tiles(
     return order.astype(np.int32), distance_m[order]
 
 
-def _compile() -> tuple[int, dict[str, int]]:
+def fragment_shader(grain: bool) -> str:
+    """The source, with or without the surfaces' grain."""
+    return FRAGMENT_SHADER.replace("GRAINED", GRAIN if grain else SMOOTH)
+
+
+def _compile(fragment: str) -> tuple[int, dict[str, int]]:
     """Program and uniform locations; a mistake in a shader or a name raises here, never silently at ``glUniform``."""
     parts = [
         shaders.compileShader(VERTEX_SHADER, gl.GL_VERTEX_SHADER),
-        shaders.compileShader(FRAGMENT_SHADER, gl.GL_FRAGMENT_SHADER),
+        shaders.compileShader(fragment, gl.GL_FRAGMENT_SHADER),
     ]
     program = gl.glCreateProgram()
     for part in parts:

@@ -31,7 +31,8 @@ class FlatOffscreenRenderer(pyrender.OffscreenRenderer):  # type: ignore[misc]  
         super()._create()
         haze = self._drawn.haze_rgb.astype(np.float64) / 255.0
         fine_range_m = FINE_DETAIL_M * self._camera.focal_px() * self._camera.supersample
-        self._renderer = FlatRenderer(self.viewport_width, self.viewport_height, haze, self._drawn.extinction_per_m, fine_range_m)
+        extinction, grain = self._drawn.extinction_per_m, self._camera.grain
+        self._renderer = FlatRenderer(self.viewport_width, self.viewport_height, haze, extinction, fine_range_m, grain)
 
 
 class FrameRenderer:

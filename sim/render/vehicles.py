@@ -38,10 +38,13 @@ BELT_SHARE: Final = (0.56, 0.50, 0.45)  # of the height, where the glass begins
 def vehicle_mesh(poses_m: FloatArray, kinds: UInt8Array, ids: IntArray, light: Light) -> Tile:
     """All vehicles at centre poses (k, 3) as one tile."""
     if len(poses_m) == 0:
-        return Tile(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), np.zeros((0, 3), np.uint8), 0)
+        return Tile(
+            np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), np.zeros((0, 3), np.uint8), np.zeros(0, np.uint8), 0
+        )
     parts = [_of_kind(kind, poses_m[kinds == kind], ids[kinds == kind]) for kind in np.unique(kinds)]
     mesh = merge(parts)
-    return Tile(mesh.vertices_m, mesh.faces, shade(mesh.albedo, mesh.normals, light), len(mesh.faces))
+    smooth = np.zeros(len(mesh.vertices_m), np.uint8)  # grain is fixed to the ground: on what moves it would swim
+    return Tile(mesh.vertices_m, mesh.faces, shade(mesh.albedo, mesh.normals, light), smooth, len(mesh.faces))
 
 
 def _of_kind(kind: int, poses_m: FloatArray, ids: IntArray) -> Mesh:

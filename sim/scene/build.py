@@ -8,7 +8,7 @@ import numpy as np
 
 from hippodrome.core.types import FloatArray, IntArray
 from hippodrome.sim.scene.conditions import Conditions
-from hippodrome.sim.scene.light import colour, extinction_per_m, haze_rgb, light_of, sky_dome
+from hippodrome.sim.scene.light import colour, extinction_per_m, grain, haze_rgb, light_of, sky_dome
 from hippodrome.sim.scene.mesh import Mesh, merge
 from hippodrome.sim.scene.town_mesh import town_mesh
 from hippodrome.sim.scene.types import Scene, Tile
@@ -34,20 +34,21 @@ def build_scene(town: Town, seed: int, conditions: Conditions) -> Scene:
 def _tiles(bold: Mesh, fine: Mesh, conditions: Conditions) -> tuple[Tile, ...]:
     """Faces grouped by the tile of their centre, bold ones first; each tile with the vertices that it uses."""
     mesh = merge([bold, fine])
-    rgb = colour(mesh, conditions, light_of(conditions))
+    rgb, rough = colour(mesh, conditions, light_of(conditions)), grain(mesh)
     is_fine = np.arange(len(mesh.faces)) >= len(bold.faces)
     tile = _tile_of_faces(mesh.vertices_m[mesh.faces].mean(axis=1)[:, :2])
     order = np.lexsort((is_fine, tile)).astype(np.int32)
     starts = np.flatnonzero(np.diff(tile[order], prepend=-1))
-    return tuple(_tile(mesh, rgb, rows, is_fine) for rows in np.split(order, starts[1:]))
+    return tuple(_tile(mesh, rgb, rough, rows, is_fine) for rows in np.split(order, starts[1:]))
 
 
-def _tile(mesh: Mesh, rgb: np.ndarray, rows: IntArray, is_fine: np.ndarray) -> Tile:
+def _tile(mesh: Mesh, rgb: np.ndarray, rough: np.ndarray, rows: IntArray, is_fine: np.ndarray) -> Tile:
     used, faces = np.unique(mesh.faces[rows], return_inverse=True)
     return Tile(
         vertices_m=mesh.vertices_m[used],
         faces=faces.reshape(-1, 3).astype(np.int32),
         rgb=rgb[used],
+        grain=rough[used],
         bold_faces=int(np.count_nonzero(~is_fine[rows])),
     )
 

@@ -33,6 +33,16 @@ TINTS: Final[dict[str, dict[Surface, tuple[float, tuple[float, float, float]]]]]
     },
 }
 
+# Grain of each surface as a share of its colour: asphalt's stones, plaster and brick, blades, leaves; glass has none.
+GRAIN: Final[dict[Surface, float]] = {
+    Surface.MINERAL: 0.16,
+    Surface.GRASS: 0.24,
+    Surface.CROP: 0.24,
+    Surface.LEAF: 0.40,
+    Surface.NEEDLE: 0.40,
+    Surface.WINDOW: 0.0,
+}
+
 
 def light_of(conditions: Conditions) -> Light:
     """Sun and sky radiance; clouds and dusk take from the sun first."""
@@ -72,6 +82,12 @@ def colour(mesh: Mesh, conditions: Conditions, light: Light) -> UInt8Array:
     weight = share[mesh.surface][:, None]
     rgb = shade((1.0 - weight) * mesh.albedo + weight * tint[mesh.surface], mesh.normals, light)
     return np.where(_lit_windows(mesh, conditions)[:, None], to_levels(LAMP), rgb)
+
+
+def grain(mesh: Mesh) -> UInt8Array:
+    """Grain (n,) of a mesh's vertices, ``Tile.grain``."""
+    share = np.array([GRAIN[surface] for surface in Surface])
+    return to_levels(share)[mesh.surface]
 
 
 def _lit_windows(mesh: Mesh, conditions: Conditions) -> np.ndarray:
@@ -121,7 +137,8 @@ def sky_dome(conditions: Conditions) -> Tile:
     )
     rgb = to_levels(_sky(ray.reshape(-1, 3), conditions))
     vertices = (DOME_RADIUS_M * ray.reshape(-1, 3)).astype(np.float32)
-    return Tile(vertices_m=vertices, faces=faces.astype(np.int32), rgb=rgb, bold_faces=len(faces))
+    smooth = np.zeros(len(vertices), dtype=np.uint8)
+    return Tile(vertices_m=vertices, faces=faces.astype(np.int32), rgb=rgb, grain=smooth, bold_faces=len(faces))
 
 
 def _sky(ray: FloatArray, conditions: Conditions) -> FloatArray:

@@ -14,6 +14,7 @@ class Tile:
     vertices_m: Float32Array  # (n, 3) relative to the scene's origin, z up from the road
     faces: IntArray  # (m, 3)
     rgb: UInt8Array  # (n, 3)
+    grain: UInt8Array  # (n,) how far the surface's fine grain strays from its colour, as a share of it, 255 being all
     bold_faces: int  # the first this many faces are worth drawing at any distance; the rest is fine detail
 
 

@@ -20,12 +20,12 @@ LOOK = Conditions()
 NONE = np.zeros((0, 3)), np.zeros(0, np.uint8)
 
 
-def wall(x_m, half_width_m=2.0, centre_y_m=0.0, rgb=RED):
+def wall(x_m, half_width_m=2.0, centre_y_m=0.0, rgb=RED, grain=0):
     """A wall across the x axis that faces the origin, 6 m high."""
     y = centre_y_m + half_width_m * np.array([1, -1, -1, 1])
     corners = np.stack([np.full(4, x_m), y, np.array([0, 0, 6, 6])], axis=1)
     faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
-    return Tile(corners.astype(np.float32), faces, np.tile(np.uint8(rgb), (4, 1)), 2)
+    return Tile(corners.astype(np.float32), faces, np.tile(np.uint8(rgb), (4, 1)), np.full(4, grain, np.uint8), 2)
 
 
 def scene(*tiles, extinction=0.0, origin=(0.0, 0.0)):
@@ -98,6 +98,21 @@ def test_stereo_without_a_baseline_is_refused():
         renderer.render_stereo(np.zeros(3), *NONE)
 
 
+def test_grain_stays_on_its_surface_and_leaves_the_mean_colour():
+    stage = scene(wall(8.0, 6.0, grain=60))
+    with FrameRenderer(stage, camera(stereo_baseline_m=0.5, grain=True)) as renderer:
+        left, right = (image[20:66, 40:120].astype(int) for image in renderer.render_stereo(np.zeros(3), *NONE))
+    assert len(np.unique(left[..., 0])) > 50
+    assert np.mean(left[:, 5:] == right[:, :-5]) > 0.95  # disparity 5: what is seen moves with the wall
+    assert np.all(np.abs(left.mean(axis=(0, 1)) / RED - 1.0) < 0.1)
+
+
+def test_grain_is_not_drawn_unless_asked_for_nor_on_what_moves():
+    assert np.array_equal(draw(scene(wall(8.0, grain=60)), camera()), draw(scene(wall(8.0)), camera()))
+    moving = vehicle_mesh(np.zeros((1, 3)), np.zeros(1, np.uint8), np.array([4]), light_of(LOOK))
+    assert not moving.grain.any() and len(moving.grain) == len(moving.vertices_m)
+
+
 def test_the_nearer_wall_hides_the_farther_one():
     blue = wall(20.0, 6.0, rgb=(10, 20, 200))
     for tiles in ((wall(10.0), blue), (blue, wall(10.0))):
@@ -157,7 +172,9 @@ def test_two_renderers_at_once_are_refused_and_a_closed_one_can_be_replaced():
     assert is_red(draw(scene(wall(10.0)), camera())).any()
 
 
-@pytest.mark.parametrize("broken", ["#version 330 core\nnonsense", flat.FRAGMENT_SHADER.replace("haze, base", "base, base")])
+@pytest.mark.parametrize(
+    "broken", ["#version 330 core\nnonsense", flat.FRAGMENT_SHADER.replace("haze, grained", "base.rgb, grained")]
+)
 def test_a_broken_shader_is_loud_and_leaves_no_renderer_behind(monkeypatch, broken):
     monkeypatch.setattr(flat, "FRAGMENT_SHADER", broken)
     with pytest.raises(Exception, match=r"nonsense|haze|compile"):

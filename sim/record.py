@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from importlib.metadata import version
@@ -12,6 +13,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from hippodrome.core.types import Frame
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.episode import Samples, camera_divider, draw_frame, sample_drive
 from hippodrome.sim.files import sha256_of
@@ -128,14 +130,21 @@ def _simulate(plan: RecordingPlan, folder: Path) -> None:
 
 def render_chunk(plan: RecordingPlan, chunk: int) -> int:
     """Draw one chunk of frames to disk; the number of frames."""
-    folder = plan.folder()
-    samples, drive = _episode_of(folder)
-    first = chunk * CHUNK_FRAMES
-    numbers = range(first, min(first + CHUNK_FRAMES, len(samples.frame_steps)))
+    samples = _episode_of(plan.folder())[0]
+    write_chunk(chunk_path(plan.folder(), chunk), chunk * CHUNK_FRAMES, draw_chunk(plan, chunk))
+    return len(_numbers(samples, chunk))
+
+
+def draw_chunk(plan: RecordingPlan, chunk: int) -> Iterator[tuple[Frame, ...]]:
+    """The frames of one chunk of a prepared drive, each drawn when it is asked for; nothing is written."""
+    samples, drive = _episode_of(plan.folder())
     renderer, conditions = _renderer(plan), plan.drive_spec.conditions
-    frames = (draw_frame(renderer, drive, samples, number, conditions, plan.seed) for number in numbers)
-    write_chunk(chunk_path(folder, chunk), first, frames)
-    return len(numbers)
+    return (draw_frame(renderer, drive, samples, number, conditions, plan.seed) for number in _numbers(samples, chunk))
+
+
+def _numbers(samples: Samples, chunk: int) -> range:
+    first = chunk * CHUNK_FRAMES
+    return range(first, min(first + CHUNK_FRAMES, len(samples.frame_steps)))
 
 
 @lru_cache(maxsize=1)

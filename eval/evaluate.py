@@ -20,6 +20,7 @@ from hippodrome.eval.metrics import ape
 from hippodrome.eval.report_evidence import write_map_evidence
 from hippodrome.eval.results import Network, Row, ScenarioResult, summarize, summarize_localization
 from hippodrome.eval.scenario_figures import draw_scenario
+from hippodrome.eval.scenario_files import portable
 from hippodrome.eval.stages import dead_reckoning, localize_recording, map_recording, refine_map
 from hippodrome.eval.trajectory_io import write_tum
 from hippodrome.eval.warm_up import warm_up
@@ -186,7 +187,7 @@ def _network(materials: Materials) -> Network:
     first_lane = np.unique(roads.lane_edge[is_road], return_index=True)[1]
     km = float(roads.lane_lengths_m()[is_road][first_lane].sum()) / 1e3
     return Network(
-        path=spec.network.name if spec.network else None,
+        path=portable(spec.network) if spec.network else None,
         generator=None if spec.network else spec.kind,
         edges=len(first_lane),
         km=km,
@@ -194,10 +195,10 @@ def _network(materials: Materials) -> Network:
 
 
 def _configuration(scenario: Scenario) -> dict[str, Any]:
-    """The effective configuration; of a network file only the name, so that results do not depend on where it lies."""
+    """The effective configuration; a network file is named so that results do not depend on where it lies."""
     values: dict[str, Any] = json.loads(scenario.model_dump_json())  # JSON has no infinity: such a limit becomes null
     if scenario.town.network is not None:
-        values["town"]["network"] = scenario.town.network.name
+        values["town"]["network"] = portable(scenario.town.network)
     return values
 
 

@@ -15,13 +15,14 @@ from hippodrome.eval.paper_rows import quoted_rows
 from hippodrome.eval.pool import Workers, worker_pool
 from hippodrome.eval.report import REPORT, write_report
 from hippodrome.eval.results import Results, ScenarioResult, write_results
+from hippodrome.eval.scenario_files import read_scenario
 from hippodrome.eval.tables import print_table_one, table_one_markdown
 from hippodrome.eval.thresholds import failed_limits
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import ROLES, RecordingPlan, finish, prepare, render_chunk
 from hippodrome.sim.recording import CHUNK_FRAMES
 from hippodrome.sim.render.probe import require_gl
-from hippodrome.sim.scenario import Scenario, load_scenario
+from hippodrome.sim.scenario import Scenario
 
 RESULTS = "results.json"
 
@@ -55,7 +56,7 @@ def render(paths: Sequence[Path], network: Path | None, seed: int | None, worker
 
 def load_scenarios(paths: Sequence[Path], network: Path | None, seed: int | None) -> list[Scenario]:
     """All scenarios, each with a name of its own: results are filed under it."""
-    scenarios = [load_scenario(path, network, seed) for path in paths]
+    scenarios = [read_scenario(path, network, seed) for path in paths]
     name, times = Counter(scenario.name for scenario in scenarios).most_common(1)[0]
     if times > 1:
         raise HippodromeError(f"{times} scenarios are named '{name}': results are filed by name, so give each its own")

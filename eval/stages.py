@@ -28,6 +28,7 @@ from hippodrome.core.types import (
     StartPose,
     Trajectory,
 )
+from hippodrome.eval.scenario_files import located
 from hippodrome.eval.trajectory_io import write_tum
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.network import read_network
@@ -105,7 +106,7 @@ def refine_files(
         raise HippodromeError("mode 'paper' begins at a known pose: give --start X,Y,HEADING, or use --mode default")
     cognitive_map, provenance = load_map(source)
     config = replace(_settings(scenario).refine, mode=mode)
-    refinement, cpu_s = refine_map(cognitive_map, read_network(network), config, start)
+    refinement, cpu_s = refine_map(cognitive_map, read_network(located(network, "--network")), config, start)
     save_map(out, refinement.cognitive_map, {**provenance, "network": network.name, "refine": repr(config)})
     for stretch in refinement.breaks:
         print(f"vertices {stretch.first_vertex}-{stretch.last_vertex}: {stretch.status.name.lower()}: {stretch.cause}")
@@ -119,7 +120,7 @@ def localize_files(source: Path, recording: Path, network: Path | None, scenario
     if cognitive_map.frame != "network":
         raise HippodromeError(f"{source}: a semi-metric map has no metric frame to localize in; run `hippodrome refine` first")
     drive = open_recording(recording)
-    roads = read_network(network) if network else None
+    roads = read_network(located(network, "--network")) if network else None
     run = localize_recording(drive.observations(), cognitive_map, roads, _settings(scenario).localizer)
     known = [estimate for estimate in run.estimates if estimate.localized]
     if known:

@@ -26,13 +26,14 @@ from hippodrome.eval.perturbations import driven_streets, with_false_closures, w
 from hippodrome.eval.pool import worker_pool
 from hippodrome.eval.results import to_json
 from hippodrome.eval.run import make_recordings
+from hippodrome.eval.scenario_files import read_scenario
 from hippodrome.eval.stages import map_recording
 from hippodrome.eval.stress_table import WRONG_M, StressRow, stress_markdown
 from hippodrome.eval.warm_up import warm_up
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import RecordingPlan, finish, sensed_anew
 from hippodrome.sim.recording import Recording
-from hippodrome.sim.scenario import Scenario, load_scenario
+from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS, NoiseLevel
 from hippodrome.sim.survey import with_survey_error
 
@@ -79,7 +80,7 @@ def stress(paths: Sequence[Path], seeds: Sequence[int], names: Sequence[str], wo
     cases = tuple(case for case in CASES if not names or case.name in names)
     if unknown := set(names) - {case.name for case in CASES}:
         raise HippodromeError(f"no stress case '{sorted(unknown)[0]}'; there are: {', '.join(case.name for case in CASES)}")
-    tasks = [task for path in paths for seed in seeds for task in _tasks(load_scenario(path, seed=seed), cases, out)]
+    tasks = [task for path in paths for seed in seeds for task in _tasks(read_scenario(path, seed=seed), cases, out)]
     with worker_pool(workers) as pool:
         make_recordings([RecordingPlan(task.scenario, "mapping", out) for task in tasks], pool)
         rows = [row for part in pool.run("refine", run_cases, tasks, weight=lambda task: len(task.cases)) for row in part]

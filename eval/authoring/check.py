@@ -3,50 +3,61 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.sim.scenario import Scenario, load_scenario
-from hippodrome.sim.tour import tour_graph, toured_area
+from hippodrome.eval.authoring.errors import file_errors
+from hippodrome.eval.authoring.network_notes import network_notes
+from hippodrome.eval.evaluate import DEAD_RECKONING, MODES, SEMI_METRIC
+from hippodrome.eval.scenario_files import read_scenario
+from hippodrome.sim.record import ROLES
+from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.tour import TourGraph, tour_graph, toured_area
 from hippodrome.sim.town import build_town
+
+ROWS = (*(method for method, _ in MODES), SEMI_METRIC, DEAD_RECKONING)  # that limits can speak of
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One file: an error, or what it describes and what is odd about its network."""
+    """One file: all its errors, or what it describes and what is odd about it."""
 
     path: Path
-    error: str | None
+    errors: tuple[str, ...]
     summary: str
     notes: tuple[str, ...]
 
 
 def check_scenario(path: Path) -> Finding:
     """Reads the file, builds or reads its town, and plans its tours; nothing is left on disk."""
+    if errors := file_errors(path):
+        return Finding(path, errors, "", ())
     try:
-        scenario = load_scenario(path)
+        scenario = read_scenario(path)
         with tempfile.TemporaryDirectory() as folder:
             town = build_town(scenario.town, scenario.seed, Path(folder))
         graph = tour_graph(town.network)
-        planned = {role: _covered_share(scenario, role, float(graph.length_m.sum())) for role in ("mapping", "localization")}
-        tours = ", ".join(f"{role} tour {getattr(scenario, role).tour.planned_length_m():.0f} m" for role in planned)
         toured_area(graph, scenario.mapping.tour.planned_length_m())
     except HippodromeError as error:
-        return Finding(path, str(error), "", ())
+        return Finding(path, (str(error),), "", ())
     except ValueError as error:
-        return Finding(path, f"{path}: {error}", "", ())
+        return Finding(path, (f"{path}: {error}",), "", ())
+    tours = ", ".join(f"{role} tour {getattr(scenario, role).tour.planned_length_m():.0f} m" for role in ROLES)
     summary = f"{scenario.name}: {town.name}, {len(graph.edges)} drivable edges, {graph.length_m.sum() / 1e3:.2f} km, {tours}"
-    return Finding(path, None, summary, (*town.notes, *_tour_notes(planned["mapping"])))
+    return Finding(path, (), summary, (*network_notes(scenario, town), *_tour_notes(scenario, graph), *_limit_notes(scenario)))
 
 
-def _covered_share(scenario: Scenario, role: str, drivable_m: float) -> float:
-    """How much of the drivable roads a tour can see at most."""
-    tour = getattr(scenario, role).tour
-    return float((1.0 - tour.revisit_share) * tour.planned_length_m() / drivable_m)
+def _tour_notes(scenario: Scenario, graph: TourGraph) -> Iterator[str]:
+    """How much of the drivable roads the mapping tour can see at most."""
+    tour = scenario.mapping.tour
+    share = (1.0 - tour.revisit_share) * tour.planned_length_m() / float(graph.length_m.sum())
+    if share < 0.5:
+        yield f"the mapping tour sees about {share:.0%} of the drivable roads; raise mapping.tour.length_m to see more"
 
 
-def _tour_notes(share: float) -> tuple[str, ...]:
-    if share >= 0.5:
-        return ()
-    return (f"the mapping tour sees about {share:.0%} of the drivable roads; raise mapping.tour.length_m to see more",)
+def _limit_notes(scenario: Scenario) -> Iterator[str]:
+    """Limits that speak of a row that `hippodrome eval` does not write always fail."""
+    if scenario.thresholds.method not in ROWS:
+        yield f"thresholds.method '{scenario.thresholds.method}' is none of the rows of every run: {', '.join(ROWS)}"

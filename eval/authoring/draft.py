@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Final
@@ -13,6 +13,9 @@ import numpy as np
 import yaml
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.authoring.importing import IMPORTED, KNOWN, import_map
+from hippodrome.eval.authoring.network_notes import network_notes
+from hippodrome.eval.scenario_files import PACKAGE, located
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import tour_graph
@@ -66,18 +69,28 @@ class Draft:
 
 
 def new_scenario(name: str, source: str, path: Path) -> Draft:
-    """Write a scenario for a kind of town or a network file to ``path``. Raises HippodromeError, also if ``path`` exists."""
-    if path.exists():
-        raise HippodromeError(f"{path}: exists already; choose another --out, or remove it first")
-    spec = _town_spec(source)
+    """Write a scenario for a kind of town or a map file to ``path``; a map that is no SUMO network is imported beside it.
+
+    Raises HippodromeError, also if a file that it would write exists.
+    """
+    network = path.with_name(f"{path.stem}.net.xml.gz") if _is_imported(source) else None
+    for target in filter(None, (path, network)):
+        if target.exists():
+            raise HippodromeError(f"{target}: exists already; choose another --out, or remove it first")
     with tempfile.TemporaryDirectory() as folder:
-        draft = draft_for(build_town(spec, 1, Path(folder)))
+        imported = Path(folder) / network.name if network else None
+        if imported:
+            import_map(Path(source), imported)
+        town = _town(source, imported, Path(folder))
+        draft = draft_for(town)
         text = scenario_text(name, source, path, draft)
         trial = Path(folder) / path.name
         trial.write_text(text, encoding="utf-8")
-        _check(trial, path)
+        scenario = _checked(trial, path)
+        if network and imported:
+            write_atomically(network, imported.read_bytes())
     write_atomically(path, text.encode())
-    return draft
+    return replace(draft, notes=network_notes(scenario, town))
 
 
 def draft_for(town: Town) -> Draft:
@@ -95,18 +108,17 @@ def draft_for(town: Town) -> Draft:
         vehicles=vehicles,
         rate_hz=10.0 if fast else 5.0,
         drivable_km=drivable_m / 1e3,
-        notes=town.notes,
+        notes=(),
     )
 
 
 def scenario_text(name: str, source: str, path: Path, draft: Draft) -> str:
     """The file's text."""
-    generated = source in KINDS
     return TEMPLATE.format(
-        title=f"A generated town, {source}." if generated else f"The roads of {Path(source).name}.",
+        title=f"A generated town, {source}." if source in KINDS else f"The roads of {Path(source).name}.",
         file=path,
         name=_scalar(name),
-        town=f"town: {_flow(_shipped_town(source))}" if generated else f"town: {{network: {_scalar(_relative(source, path))}}}",
+        town=_town_line(source, path),
         rate_hz=draft.rate_hz,
         tour_m=draft.tour_m,
         tour_words=_tour_words(draft),
@@ -116,17 +128,36 @@ def scenario_text(name: str, source: str, path: Path, draft: Draft) -> str:
     )
 
 
+def _town_line(source: str, path: Path) -> str:
+    if source in KINDS:
+        return f"town: {_flow(_shipped_town(source))}"
+    if _is_imported(source):
+        return f"town: {{network: {_scalar(f'{path.stem}.net.xml.gz')}}}  # imported by netconvert; netedit opens it"
+    return f"town: {{network: {_scalar(source if source.startswith(PACKAGE) else _relative(source, path))}}}"
+
+
 def _tour_words(draft: Draft) -> str:
     share = min(1.0, 0.6 * draft.tour_m / (1e3 * draft.drivable_km))
     return f"40 % of it on roads driven before; of the {draft.drivable_km:.1f} km that can be driven it sees about {share:.0%}"
 
 
-def _town_spec(source: str) -> TownSpec:
+def _is_imported(source: str) -> bool:
+    return source not in KINDS and source.endswith(IMPORTED)
+
+
+def _town(source: str, imported: Path | None, folder: Path) -> Town:
+    """The town to suit the values to. What is wrong with an imported network is said of the map that the user knows."""
     if source in KINDS:
-        return TownSpec.model_validate(_shipped_town(source))
-    if not Path(source).is_file():
+        return build_town(TownSpec.model_validate(_shipped_town(source)), 1, folder)
+    network = imported or located(Path(source), "--from")
+    if not network.is_file():
         raise HippodromeError(f"--from {source}: neither a kind of town ({', '.join(KINDS)}) nor a file")
-    return TownSpec(network=Path(source).resolve())
+    if not network.name.endswith(KNOWN):
+        raise HippodromeError(f"--from {source}: unknown kind of map; there are {', '.join(KNOWN)}")
+    try:
+        return build_town(TownSpec(network=network.resolve()), 1, folder)
+    except HippodromeError as error:
+        raise HippodromeError(str(error).replace(str(network), source)) from error
 
 
 def _shipped_town(kind: str) -> dict[str, object]:
@@ -150,10 +181,10 @@ def _flow(values: dict[str, object]) -> str:
     return yaml.safe_dump(values, default_flow_style=True, sort_keys=False, width=1000).strip()
 
 
-def _check(trial: Path, path: Path) -> None:
+def _checked(trial: Path, path: Path) -> Scenario:
     """What is written must load; only the name can be wrong."""
     try:
-        load_yaml(trial, Scenario)
+        return load_yaml(trial, Scenario)
     except ScenarioError as error:
         raise ScenarioError(str(error).replace(str(trial), str(path))) from None
 

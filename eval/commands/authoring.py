@@ -18,7 +18,7 @@ def add_scenario_command(commands: Any) -> None:
     new = actions.add_parser("new", help="write a commented scenario for a road network", description=_new.__doc__)
     new.add_argument("name", metavar="NAME")
     new.add_argument("--from", dest="source", required=True, metavar="SOURCE",
-                     help="rural, grid, radial, random, or a .net.xml, .net.xml.gz, .osm or .xodr file")  # fmt: skip
+                     help="rural, grid, radial, random, or a .net.xml, .osm (also .gz, .pbf) or .xodr file")  # fmt: skip
     new.add_argument("--out", type=Path, metavar="FILE", help="default: NAME.yaml")
     new.set_defaults(command=_new)
 
@@ -27,8 +27,10 @@ def add_scenario_command(commands: Any) -> None:
     validate.set_defaults(command=_validate)
 
     preview = actions.add_parser("preview", help="both drives and a few frames, in seconds", description=_preview.__doc__)
-    preview.add_argument("file", type=Path, metavar="FILE")
-    preview.add_argument("--out", type=Path, metavar="DIR", help="default: out/preview/NAME")
+    preview.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    preview.add_argument(
+        "--out", type=Path, default=Path("out/preview"), metavar="DIR", help="pictures go to DIR/NAME (default: out/preview)"
+    )
     preview.set_defaults(command=_preview)
 
     schema = actions.add_parser("schema", help="print the JSON schema of a scenario", description=_schema.__doc__)
@@ -55,9 +57,9 @@ def _validate(options: argparse.Namespace) -> int:
     failed = False
     for path in options.files:
         finding = check_scenario(path)
-        failed |= finding.error is not None
-        if finding.error is not None:
-            print(finding.error, file=sys.stderr)
+        failed |= bool(finding.errors)
+        if finding.errors:
+            print("\n".join(finding.errors), file=sys.stderr)
             continue
         print(f"{path}: ok: {finding.summary}")
         for note in finding.notes:
@@ -66,14 +68,15 @@ def _validate(options: argparse.Namespace) -> int:
 
 
 def _preview(options: argparse.Namespace) -> int:
-    """Simulate both drives of a scenario, draw them from above and a few frames; prints statistics."""
+    """Simulate both drives of each scenario, draw them from above and a few frames; prints statistics."""
     from hippodrome.eval.authoring.preview import preview_scenario
-    from hippodrome.sim.scenario import load_scenario
+    from hippodrome.eval.scenario_files import read_scenario
 
-    scenario = load_scenario(options.file)
-    out = options.out or Path("out/preview") / scenario.name
-    print("\n".join(preview_scenario(scenario, out).lines()))
-    print(f"pictures: {out / 'overview.png'}, {out / 'stills.png'}")
+    for path in options.files:
+        scenario = read_scenario(path)
+        out = options.out / scenario.name
+        print("\n".join(preview_scenario(scenario, out).lines()))
+        print(f"pictures: {out / 'overview.png'}, {out / 'stills.png'}")
     return DONE
 
 

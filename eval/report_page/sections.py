@@ -22,6 +22,7 @@ from hippodrome.eval.report_page.tables import (
     worst_places,
 )
 from hippodrome.eval.results import Row, ScenarioResult
+from hippodrome.eval.scenario_files import PACKAGE
 from hippodrome.eval.tables import definitions, scenario_title
 from hippodrome.eval.thresholds import failed_limits
 from hippodrome.sim.scenario import Thresholds
@@ -174,9 +175,14 @@ def _commands(scenario: ScenarioResult, evidence: MapEvidence | None) -> Html:
 
 def _command_lines(scenario: ScenarioResult, evidence: MapEvidence | None) -> Iterator[tuple[str, str]]:
     name = scenario.name
-    network = ["--network", f"PATH/{scenario.network.path}"] if scenario.network.path else []
+    path = scenario.network.path
+    packaged = path is not None and path.startswith(PACKAGE)  # then the scenario itself finds it
+    network = ["--network", path if packaged else f"PATH/{path}"] if path else []
     settings = ["--scenario", f"{name}/scenario.json"]
-    yield "all rows", shlex.join(["hippodrome", "eval", f"{name}/scenario.json", *network, "--out", "again"])
+    yield (
+        "all rows",
+        shlex.join(["hippodrome", "eval", f"{name}/scenario.json", *([] if packaged else network), "--out", "again"]),
+    )
     if evidence is None or not {"mapping", "localization"} <= set(evidence.recordings):
         return
     roads = network or ["--network", f"towns/{evidence.network}"]

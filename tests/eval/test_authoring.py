@@ -22,10 +22,6 @@ from hippodrome.sim.town import build_town
 
 ROOT = Path(__file__).parents[2]
 NETWORK = Path(sumo.SUMO_HOME) / "tools" / "game" / "fokr_bs_demo" / "fokr_bs.net.xml.gz"
-OSM = """<?xml version="1.0"?><osm version="0.6">
-{nodes}
-<way id="1">{refs}<tag k="highway" v="residential"/><tag k="maxspeed" v="30"/></way>
-</osm>"""
 
 
 @pytest.fixture
@@ -47,7 +43,7 @@ def test_new_from_a_network_suits_it_and_can_be_used_at_once(tmp_path, network):
     assert LOCALIZATION_M[0] <= scenario.localization.tour.length_m <= LOCALIZATION_M[1]
     assert scenario.mapping.tour.length_m == pytest.approx(1300 * draft.drivable_km, abs=51)
     assert scenario.thresholds.ape_mean_m is not None
-    assert check_scenario(path).error is None
+    assert check_scenario(path).errors == ()
 
 
 def test_new_moves_with_its_network(tmp_path, network):
@@ -56,7 +52,7 @@ def test_new_moves_with_its_network(tmp_path, network):
     moved.mkdir()
     (tmp_path / "nets").rename(moved / "nets")
     (tmp_path / "ring.yaml").rename(moved / "ring.yaml")
-    assert check_scenario(moved / "ring.yaml").error is None
+    assert check_scenario(moved / "ring.yaml").errors == ()
     shown = load_scenario(moved / "ring.yaml").town.network
     assert shown.is_file()
 
@@ -66,17 +62,6 @@ def test_new_from_a_kind_builds_the_shipped_town(tmp_path, kind):
     path = tmp_path / "a.yaml"
     new_scenario("a", kind, path)
     assert load_scenario(path).town == load_scenario(ROOT / "scenarios" / "towns" / f"{kind}.yaml").town
-
-
-def test_new_reads_openstreetmap(tmp_path):
-    corners = [(50.0, 8.0), (50.0, 8.004), (50.002, 8.004), (50.002, 8.0)]
-    nodes = "".join(f'<node id="{i}" lat="{lat}" lon="{lon}"/>' for i, (lat, lon) in enumerate(corners, 1))
-    refs = "".join(f'<nd ref="{i}"/>' for i in (1, 2, 3, 4, 1))
-    source = tmp_path / "block.osm"
-    source.write_text(OSM.format(nodes=nodes, refs=refs))
-    draft = new_scenario("block", str(source), tmp_path / "block.yaml")
-    assert 0.8 < draft.drivable_km < 2.5  # a block of about 290 m by 220 m, both directions
-    assert check_scenario(tmp_path / "block.yaml").error is None
 
 
 @pytest.mark.parametrize("name", ["two words", "a: b", "../up", "", "'quoted'", "- x", "yes"])
@@ -128,16 +113,16 @@ def test_validate_leaves_nothing_behind(tmp_path):
 
 
 def test_preview_draws_both_drives_without_a_run(tmp_path, capsys):
+    shipped = yaml.safe_load((ROOT / "scenarios" / "library" / "village.yaml").read_text(encoding="utf-8"))
+    shipped["mapping"]["tour"]["length_m"], shipped["localization"]["tour"]["length_m"] = 500, 200
     path = tmp_path / "a.yaml"
-    path.write_text("name: a\ntown: {kind: grid, width_m: 190, height_m: 190, road_km: 1.3}\n"
-                    "camera: {width: 64, height: 48, supersample: 1}\nmapping: {tour: {length_m: 500}, traffic: {vehicles: 2}}\n"
-                    "localization: {tour: {length_m: 200}, traffic: {vehicles: 2}}\n")  # fmt: skip
+    path.write_text(yaml.safe_dump({**shipped, "camera": {"width": 64, "height": 48, "supersample": 1}}))
     assert main(["scenario", "preview", str(path), "--out", str(tmp_path / "p")]) == 0
     said = capsys.readouterr().out
     assert re.search(r"mapping: (49|5\d)\d m in \d+ s, \d+ frames", said)
     assert "localization drive on mapped roads" in said
-    assert {one.name for one in (tmp_path / "p").iterdir() if one.is_file()} == {"overview.png", "stills.png"}
-    assert not (tmp_path / "p" / "recordings").exists()
+    assert {one.name for one in (tmp_path / "p" / "village").iterdir() if one.is_file()} == {"overview.png", "stills.png"}
+    assert not (tmp_path / "p" / "village" / "recordings").exists()
 
 
 def test_visits_count_entries_not_samples(tmp_path):
@@ -201,7 +186,7 @@ def test_commands_of_the_guide_exist():
     """Each line of the guide that calls the program names a command that it has."""
     guide = (ROOT / "docs" / "authoring.md").read_text(encoding="utf-8")
     lines = re.findall(r"^    (hippodrome .+)$", guide, flags=re.MULTILINE)
-    assert 1 <= len(lines) <= 6
+    assert 1 <= len(lines) <= 7  # six from a map to a gate, and one on the side
     for line in lines:
         words = line.split()
         command = words[1:3] if words[1] == "scenario" else words[1:2]

@@ -1,0 +1,100 @@
+"""Every error of a scenario file at once, each with file, line and key: an author mends them in one go."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+from pydantic import ValidationError
+
+from hippodrome.eval.authoring.keys import noise_keys, scenario_keys
+from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.yaml_file import ScenarioError, load_yaml
+
+UNKNOWN: Final = "extra_forbidden"  # pydantic's name for a key that the model does not have
+MODEL_TYPES: Final = ("model_type", "dataclass_type")  # and for a plain value where keys are wanted
+
+
+def file_errors(path: Path) -> tuple[str, ...]:
+    """One line for each error, in the order of the file; none if it is a scenario. Networks are not looked at."""
+    first: ScenarioError | None = None
+    try:
+        load_yaml(path, Scenario)
+    except ScenarioError as error:
+        first = error
+        if not isinstance(error.__context__, ValidationError):  # unreadable, or no YAML: there is no second error to find
+            return (str(error),)
+    root = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+    found = list(_repeated(root, (), set()))
+    if first is not None and isinstance(first.__context__, ValidationError):
+        found += _invalid(root, first.__context__)
+    found = sorted(dict.fromkeys(found), key=lambda one: one[0])
+    return tuple(f"{path}:{line}: {words}" for line, words in found)
+
+
+def _invalid(root: yaml.Node | None, error: ValidationError) -> Iterator[tuple[int, str]]:
+    """Line and words of what the model refuses."""
+    for one in error.errors(include_url=False):
+        line, place, node = _find(root, one["loc"])
+        if one["type"] == "missing":
+            place = f"{place}.{one['loc'][-1]}".removeprefix(".")
+        if isinstance(node, yaml.MappingNode) and one["type"] == "literal_error":
+            continue  # a mapping was never meant to be one of the names: its own errors follow
+        if one["type"] in MODEL_TYPES and place == "noise":
+            continue  # and a name was never meant to be a mapping
+        yield line, f"{place}: {_reason(one, place)}".removeprefix(": ")
+
+
+def _reason(one: Mapping[str, Any], place: str) -> str:
+    if one["type"] == UNKNOWN:
+        near = difflib.get_close_matches(place, _known(place), n=1, cutoff=0.6)
+        return f"unknown key; {f'did you mean {near[0]}?' if near else 'docs/scenarios.md lists all'}"
+    if one["type"] == "missing":
+        return "must be given"
+    if one["type"] in MODEL_TYPES:
+        return "takes keys of its own; docs/scenarios.md lists them"
+    if one["type"] == "string_pattern_mismatch":
+        return next(key.meaning for key in scenario_keys() if key.name == place)
+    message = str(one["msg"]).removeprefix("Value error, ")
+    given = one.get("input")
+    return f"{message}, not {given!r}" if isinstance(given, str | int | float) and "Input should" in message else message
+
+
+def _known(place: str) -> list[str]:
+    """The keys beside and below which an unknown one was written, ends of tables and tables alike."""
+    depth = place.count(".") + 1
+    names = (key.path for key in (*scenario_keys(), *noise_keys()))
+    return sorted({".".join(path[:depth]) for path in names if len(path) >= depth})
+
+
+def _find(node: yaml.Node | None, location: Sequence[int | str]) -> tuple[int, str, yaml.Node | None]:
+    """Line, path and node of the deepest part of ``location`` that the file has; names of the model's types are skipped."""
+    line, path = node.start_mark.line + 1 if node else 1, []
+    for part in location:
+        if isinstance(node, yaml.MappingNode):
+            pair = next((pair for pair in reversed(node.value) if pair[0].value == str(part)), None)
+            if pair is not None:
+                line, node = pair[0].start_mark.line + 1, pair[1]
+                path.append(str(part))
+        elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+            node = node.value[part]
+            line = node.start_mark.line + 1
+            path.append(str(part))
+    return line, ".".join(path), node
+
+
+def _repeated(node: yaml.Node | None, path: tuple[str, ...], seen: set[int]) -> Iterator[tuple[int, str]]:
+    """Keys given twice: YAML readers take the last one without a word. Aliases may lead back to a node ``seen`` before."""
+    if not isinstance(node, yaml.MappingNode) or id(node) in seen:
+        return
+    seen.add(id(node))
+    first: dict[str, int] = {}
+    for key, value in node.value:
+        line, place = key.start_mark.line + 1, (*path, str(key.value))
+        if key.value in first:
+            yield line, f"{'.'.join(place)}: given twice, first in line {first[key.value]}; remove one"
+        first.setdefault(key.value, line)
+        yield from _repeated(value, place, seen)

@@ -1,0 +1,60 @@
+"""Scenario files as every command reads them: the model of ``sim.scenario``, with networks found in installed packages too."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from sysconfig import get_path
+from typing import Final
+
+from hippodrome.sim.scenario import Scenario, load_scenario
+from hippodrome.sim.yaml_file import ScenarioError
+
+PACKAGE: Final = "package:"  # package:sumo/tools/game/bs3d/bs.net.xml: a file that a Python package brings along
+
+
+def read_scenario(path: Path, network: Path | None = None, seed: int | None = None) -> Scenario:
+    """The scenario in ``path``; ``network`` and ``seed`` replace its own. Raises HippodromeError."""
+    scenario = load_scenario(path, network, seed)
+    named = scenario.town.network
+    if named is None:
+        return scenario
+    town = scenario.town.model_copy(update={"network": located(named, f"{path}: town.network")})
+    return scenario.model_copy(update={"town": town})
+
+
+def located(network: Path, where: str) -> Path:
+    """A network's file; of ``package:PACKAGE/FILE`` that of the installed package. Errors begin with ``where`` it is named."""
+    start = next((i for i, part in enumerate(network.parts) if part.startswith(PACKAGE)), None)
+    if start is None:
+        return network
+    package, inside = network.parts[start].removeprefix(PACKAGE), Path(*network.parts[start + 1 :])
+    root = _package_folder(package)
+    if root is None:
+        raise ScenarioError(
+            f"{where}: the Python package '{package}' is not installed; install it (sumo comes with eclipse-sumo)"
+        )
+    if not (root / inside).is_file():
+        raise ScenarioError(
+            f"{where}: the installed package '{package}' has no file {inside.as_posix()}; "
+            "another version may, or copy the network beside the scenario and name that"
+        )
+    return root / inside
+
+
+def portable(network: Path) -> str:
+    """How results name a network so that they do not depend on the machine: ``package:...``, else the file's name."""
+    for site in map(Path, {get_path("purelib"), get_path("platlib")}):
+        if network.is_relative_to(site):
+            return f"{PACKAGE}{network.relative_to(site).as_posix()}"
+    return network.name
+
+
+def _package_folder(package: str) -> Path | None:
+    """Where a top-level package lies; it is not imported."""
+    try:
+        spec = find_spec(package) if package.isidentifier() else None
+    except (ImportError, ValueError):
+        return None
+    places = list(spec.submodule_search_locations or ()) if spec is not None else []
+    return Path(places[0]) if places else None

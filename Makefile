@@ -3,9 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 WORKERS ?= 2
+GATED := scenarios/gate/*.yaml --baseline scenarios/baseline.json
 
 .DEFAULT_GOAL := help
-.PHONY: help setup eval paper baselines test lint bench docs clean
+.PHONY: help setup eval gate previews paper baselines test lint bench docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-9s %s\n", $$1, $$2}'
@@ -27,6 +28,12 @@ setup: $(VENV)/.ready  ## install everything into .venv (the other targets do th
 
 eval: setup  ## build, refine, localize and score maps of several generated towns, in out/eval
 	@$(BIN)/hippodrome eval scenarios/towns/*.yaml --workers $(WORKERS) --out out/eval
+
+previews: setup  ## look at every scenario: drives from above and stills, in out/preview
+	@$(BIN)/hippodrome scenario preview scenarios/*.yaml scenarios/*/*.yaml --out out/preview
+
+gate: setup  ## hold this code to scenarios/baseline.json; UPDATE=--update makes it the baseline
+	@$(BIN)/hippodrome gate $(GATED) $(UPDATE) --workers $(WORKERS) --junit out/gate/gate.xml
 
 paper: setup  ## the paper's drive: 1,315 s, 14,717 frames, about 7.2 km
 	@$(BIN)/hippodrome eval scenarios/paper.yaml --workers $(WORKERS) --out out/paper

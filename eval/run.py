@@ -28,8 +28,13 @@ RESULTS = "results.json"
 
 
 def evaluate(paths: Sequence[Path], network: Path | None, seed: int | None, workers: int, out: Path) -> bool:
-    """Evaluate scenarios into ``out``; whether all their thresholds hold. Raises HippodromeError on bad input."""
+    """Evaluate scenarios into ``out`` and show the tables; whether all their thresholds hold. Raises HippodromeError."""
     scenarios = load_scenarios(paths, network, seed)
+    return _report(scenarios, run_scenarios(scenarios, workers, out), out)
+
+
+def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path) -> Results:
+    """Results of scenarios, also as files in ``out``: ``results.json``, tables, figures, report."""
     require_gl()
     plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
     with worker_pool(workers) as pool:
@@ -40,7 +45,7 @@ def evaluate(paths: Sequence[Path], network: Path | None, seed: int | None, work
     write_results(out / RESULTS, results)
     write_atomically(out / "table1.md", table_one_markdown(results, quoted_rows()).encode())
     write_report(out)
-    return _report(scenarios, results, out)
+    return results
 
 
 def render(paths: Sequence[Path], network: Path | None, seed: int | None, workers: int, out: Path) -> None:

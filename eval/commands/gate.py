@@ -14,10 +14,12 @@ SEEDS = (1, 2, 3)
 def add_gate_commands(commands: Any) -> None:
     """Adds ``gate`` and ``compare`` to the parser's ``commands``."""
     parser = commands.add_parser("gate", help="compare with a baseline over several seeds", description=_gate.__doc__)
-    parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.yaml")
+    parser.add_argument("scenarios", type=Path, nargs="*", metavar="SCENARIO.yaml")
     parser.add_argument("--baseline", type=Path, default=Path("baseline.json"), metavar="FILE", help="default: baseline.json")
     parser.add_argument("--seeds", type=_seeds, default=SEEDS, metavar="1,2,3", help="default: 1,2,3")
     parser.add_argument("--update", action="store_true", help="make this run the baseline instead of comparing with it")
+    parser.add_argument("--power", nargs="?", const="topometric", metavar="METHOD",
+                        help="run nothing: say what the gate would catch, on the figures of the baseline")  # fmt: skip
     add_workers(parser)
     add_out(parser, "out/gate")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the verdict as JUnit XML as well")
@@ -41,10 +43,17 @@ def _seeds(text: str) -> tuple[int, ...]:
 
 def _gate(options: argparse.Namespace) -> int:
     """Fail (exit status 1) if a limit of a scenario does not hold, or a figure is worse than the baseline's and not by chance."""
-    from hippodrome.eval.gate.run import gate
+    from rich.console import Console
 
-    passed = gate(options.scenarios, options.seeds, options.baseline, options.update, options.workers, options.out, options.junit)
-    return DONE if passed else THRESHOLD_FAILED
+    from hippodrome.eval.gate.baseline import read_baseline
+    from hippodrome.eval.gate.power import print_power
+    from hippodrome.eval.gate.run import Request, gate
+
+    if options.power is not None:
+        print_power(read_baseline(options.baseline), options.power, Console())
+        return DONE
+    names = ("scenarios", "seeds", "baseline", "update", "workers", "out", "junit")
+    return DONE if gate(Request(**{name: getattr(options, name) for name in names})) else THRESHOLD_FAILED
 
 
 def _compare(options: argparse.Namespace) -> int:

@@ -38,7 +38,7 @@ class Cell(_Model):
 
     scenario: str
     seed: int
-    question: str  # hash of everything in the scenario that the method has to answer
+    question: str  # hash of everything that the method has to answer
     method: str
     failed: bool
     localized: bool | None  # None: the method does not localize
@@ -86,18 +86,19 @@ def read_baseline(path: Path) -> Baseline:
         raise GateError(f"{path}: {place or 'top level'}: {first['msg']}") from error
 
 
-def question_of(configuration: dict[str, Any]) -> str:
-    """Hash of what is asked: town, drives, camera, noise. Constants of the algorithms are not in it."""
+def question_of(result: ScenarioResult) -> str:
+    """Hash of what is asked: town, drives, camera, noise, and what came of them. Constants of the algorithms are not in it."""
+    configuration: dict[str, Any] = getattr(result, "configuration", None) or {}
     asked = {key: value for key, value in configuration.items() if key not in ANSWERS}
-    return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
+    driven = [result.network.edges, round(result.network.km, 3), result.frames]  # a file's name does not say what is in it
+    return hashlib.sha256(json.dumps([asked, driven], sort_keys=True).encode()).hexdigest()[:16]
 
 
 def _cell(result: ScenarioResult, row: Row) -> Cell:
-    configuration = getattr(result, "configuration", None) or {}
     return Cell(
         scenario=result.name,
         seed=result.seed,
-        question=question_of(configuration),
+        question=question_of(result),
         method=row.method,
         failed=row.failure is not None,
         localized=row.localization.success if row.localization is not None else None,

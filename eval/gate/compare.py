@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,11 +11,13 @@ from scipy.stats import t as student_t
 
 from hippodrome.eval.gate.baseline import Baseline, Cell, GateError
 
-ALPHA: Final = 0.05  # chance of failing a build that is no worse, over all figures together
+ALPHA: Final = 0.01  # chance of failing a build that is no worse, over all figures together: one in a hundred pull requests
 TOLERANCE: Final = 0.03  # a mean change below this is not worth anybody's morning, however certain
 REPEATABILITY: Final = 0.01  # least standard deviation of a pair's ratio: other processors and drivers round differently
 FLOOR_M: Final = 0.01  # errors below a centimetre count as one: their ratios mean nothing
 MIN_PAIRS: Final = 3  # fewer say nothing about chance
+JUMP_RATIO: Final = 2.0  # a single pair that is this much worse fails by itself: one outlier widens the test's own error bar
+JUMP_M: Final = 0.5  # and by this much: below, a doubled error is still inside the lane
 
 Key = tuple[str, int, str]
 
@@ -44,7 +46,7 @@ class Verdict:
     """All that moved, and what was lost outright."""
 
     changes: tuple[Change, ...]
-    lost: tuple[str, ...]  # rows that fail now, drives that are no longer localized
+    lost: tuple[str, ...]  # rows that fail now, drives that are no longer localized, single errors that more than doubled
 
     @property
     def passed(self) -> bool:
@@ -56,7 +58,9 @@ def compare(run: Baseline, baseline: Baseline) -> Verdict:
     now, then = ({cell.key: cell for cell in one.cells} for one in (run, baseline))
     require_comparable(now, then)
     tests = [_test(method, figure, pairs) for (method, figure), pairs in _pairs(now, then).items()]
-    return Verdict(tuple(_judged(tests)), tuple(lost_cells(now, then)))
+    changes = _judged(tests)
+    proven = {(change.method, change.figure) for change in changes if change.regressed}
+    return Verdict(tuple(changes), (*lost_cells(now, then), *_jumps(now, then, proven)))
 
 
 def require_comparable(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> None:
@@ -133,3 +137,14 @@ def lost_cells(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> list[str]:
         if then[key].localized and not now[key].localized:
             lost.append(f"{_place(key)}: no longer localized")
     return lost
+
+
+def _jumps(now: Mapping[Key, Cell], then: Mapping[Key, Cell], proven: Collection[tuple[str, str]]) -> list[str]:
+    """Single figures that are so much worse that no mean is needed; those whose mean fails anyway are not told twice."""
+    pairs = [(key, name, then[key].figures[name].value, figure.value) for key in sorted(now)
+             for name, figure in sorted(now[key].figures.items()) if name in then[key].figures]  # fmt: skip
+    return [
+        f"{_place(key)}: {name} was {old_m:.3g} and is {new_m:.3g}"
+        for key, name, old_m, new_m in pairs
+        if (key[2], name) not in proven and new_m > JUMP_RATIO * old_m and new_m - old_m > JUMP_M
+    ]

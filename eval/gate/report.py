@@ -5,31 +5,50 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from hippodrome.eval.gate.compare import Change, Verdict
 
+SHOWN = 12  # reasons on the terminal: who broke everything needs no list of it
 MOVED = 0.005  # half a per cent: below, a figure stands still
 
 
 def print_verdict(verdict: Verdict, limits: Sequence[str], console: Console) -> None:
-    """The figures that moved, and the verdict."""
+    """The figures that moved, why the build fails, and the verdict; fits a terminal of 80 columns."""
     moved = [change for change in verdict.changes if abs(change.ratio - 1.0) > MOVED]
     if moved:
-        table = Table(title="what moved", title_justify="left")
-        for head in HEADS:
-            table.add_column(head, justify="left" if head in ("method", "figure", "verdict", "worst pair") else "right")
-        for change in moved:
-            table.add_row(*_cells(change), style="red" if change.regressed else "green" if change.ratio < 1.0 else None)
-        console.print(table)
-    for line in (*verdict.lost, *limits):
-        console.print(line, style="red", markup=False, highlight=False)
+        console.print(_table(moved))
+    worse = [f"{change.method}: {_why(change)}" for change in verdict.changes if change.regressed]
+    lines = [*worse, *verdict.lost, *limits]
+    for line in lines[:SHOWN]:
+        console.print(line, style="red", markup=False, highlight=False, soft_wrap=True)
+    if len(lines) > SHOWN:
+        console.print(f"and {len(lines) - SHOWN} more; --junit has all", highlight=False)
     still = len(verdict.changes) - len(moved)
     outcome = "passed" if verdict.passed and not limits else "FAILED"
     console.print(f"gate {outcome}: {len(moved)} figure(s) moved, {still} stand still", markup=False, highlight=False)
 
 
+def _table(moved: Sequence[Change]) -> Table:
+    table = Table(
+        title="what moved (geometric means over the pairs, m)", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
+    )
+    for head in ("method", "figure", "before", "after", "change", "verdict"):
+        table.add_column(head, justify="left" if head in ("method", "figure", "verdict") else "right", no_wrap=head != "verdict")
+    for change in moved:
+        cells = (change.method, change.figure.removesuffix(UNIT), *_cells(change)[2:5], _word(change))
+        table.add_row(*cells, style="red" if change.regressed else "green" if change.ratio < 1.0 else None)
+    return table
+
+
+def _why(change: Change) -> str:
+    """A regression in words."""
+    return f"{change.figure.removesuffix(UNIT)} {_percent(change)} (p {change.p_worse:.1g}); most in {change.worst} m"
+
+
+UNIT = " mean (m)"
 HEADS = ("method", "figure", "before", "after", "change", "p", "verdict", "worst pair")
 
 
@@ -52,7 +71,7 @@ def junit_xml(verdict: Verdict, limits: Sequence[str]) -> bytes:
     for change in verdict.changes:
         case = ElementTree.SubElement(suite, "testcase", classname=_xml(change.method), name=change.figure)
         if change.regressed:
-            ElementTree.SubElement(case, "failure", message=_xml(f"{_percent(change)}, p {change.p_worse:.2g}, {change.worst}"))
+            ElementTree.SubElement(case, "failure", message=_xml(_why(change)))
     for kind, line in outright:
         case = ElementTree.SubElement(suite, "testcase", classname=kind, name=_xml(line))
         ElementTree.SubElement(case, "failure", message=_xml(line))
@@ -71,11 +90,11 @@ def _word(change: Change) -> str:
         return "WORSE"
     if abs(change.ratio - 1.0) <= MOVED:
         return "same"
-    return "better" if change.ratio < 1.0 else "worse, not proven"
+    return "better" if change.ratio < 1.0 else "worse?"
 
 
 def _percent(change: Change) -> str:
-    return f"{100.0 * (change.ratio - 1.0):+.1f} %"
+    return f"{100.0 * (change.ratio - 1.0):+.1f} %" if change.ratio < 10.0 else f"x {change.ratio:.0f}"
 
 
 def _escaped(text: str) -> str:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 
-from hippodrome.eval.gate.baseline import GateError, baseline_of, read_baseline, write_baseline
+from hippodrome.eval.gate.baseline import Baseline, GateError, baseline_of, read_baseline, write_baseline
 from hippodrome.eval.gate.compare import MIN_PAIRS, Verdict, compare
 from hippodrome.eval.gate.report import junit_xml, print_verdict, summary_markdown
-from hippodrome.eval.results import Results, read_results
-from hippodrome.eval.run import RESULTS, evaluate
+from hippodrome.eval.results import Results
+from hippodrome.eval.run import load_scenarios, run_scenarios
 from hippodrome.eval.thresholds import failed_limits
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.scenario import Thresholds
@@ -20,22 +21,48 @@ from hippodrome.sim.scenario import Thresholds
 SUMMARY = "GITHUB_STEP_SUMMARY"  # where GitHub Actions wants Markdown
 
 
-def gate(
-    scenarios: Sequence[Path], seeds: Sequence[int], baseline: Path, update: bool, workers: int, out: Path, junit: Path | None
-) -> bool:
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What the command line asks for."""
+
+    scenarios: Sequence[Path]
+    seeds: Sequence[int]
+    baseline: Path
+    update: bool
+    workers: int
+    out: Path
+    junit: Path | None
+
+
+def gate(request: Request) -> bool:
     """Whether the run is as good as the baseline and within all limits; with ``update`` it becomes the baseline."""
-    if len(scenarios) * len(seeds) < MIN_PAIRS:
+    if not request.scenarios:
+        raise GateError("no scenario: name one or more files")
+    if len(request.scenarios) * len(request.seeds) < MIN_PAIRS:
         raise GateError(
-            f"{len(scenarios)} scenario(s) with {len(seeds)} seed(s): a test needs {MIN_PAIRS} pairs; give more seeds"
+            f"{len(request.scenarios)} scenario(s) with {len(request.seeds)} seed(s): a test needs {MIN_PAIRS} pairs; "
+            "give more seeds"
         )
-    known = None if update else read_baseline(baseline)  # before the minutes that a run takes
-    runs = [_run(scenarios, seed, workers, out / f"seed-{seed}") for seed in seeds]
+    known = None if request.update else read_baseline(request.baseline)  # before the minutes that a run takes
+    runs = [_run(request, seed) for seed in request.seeds]
     found, limits = baseline_of(runs), broken_limits(runs)
-    if known is None:
-        write_baseline(baseline, found)
-        print(f"{baseline}: written, {len(found.cells)} cells; commit it")
-        return True
-    return say(compare(found, known), limits, junit)
+    if known is not None:
+        return say(compare(found, known), limits, request.junit)
+    _show_update(found, request.baseline, limits)
+    write_baseline(request.baseline, found)
+    print(f"{request.baseline}: written, {len(found.cells)} cells; commit it")
+    return True
+
+
+def _show_update(found: Baseline, path: Path, limits: Sequence[str]) -> None:
+    """What the new baseline changes, where there is an old one that it compares with, and what no baseline excuses."""
+    for line in limits:
+        print(f"limit, fails the gate with any baseline: {line}")
+    if path.exists():
+        try:
+            print_verdict(compare(found, read_baseline(path)), (), Console())
+        except GateError as error:
+            print(f"not comparable with the old baseline: {error}")
 
 
 def say(verdict: Verdict, limits: Sequence[str], junit: Path | None) -> bool:
@@ -59,7 +86,6 @@ def broken_limits(runs: Sequence[Results]) -> list[str]:
     ]
 
 
-def _run(scenarios: Sequence[Path], seed: int, workers: int, out: Path) -> Results:
+def _run(request: Request, seed: int) -> Results:
     """One seed; recordings that are there already are not made again, everything after them is."""
-    evaluate(scenarios, None, seed, workers, out)
-    return read_results(out / RESULTS)
+    return run_scenarios(load_scenarios(request.scenarios, None, seed), request.workers, request.out / f"seed-{seed}")

@@ -1,11 +1,13 @@
 """The gate: real regressions fail, noise does not, and what cannot be compared is refused."""
 
+import io
 import json
 import xml.etree.ElementTree as ElementTree
 from itertools import product
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from hippodrome.eval.cli import main
 from hippodrome.eval.gate import run as gate_run
@@ -20,7 +22,8 @@ from hippodrome.eval.gate.baseline import (
     write_baseline,
 )
 from hippodrome.eval.gate.compare import compare
-from hippodrome.eval.gate.report import junit_xml, summary_markdown
+from hippodrome.eval.gate.power import power_of
+from hippodrome.eval.gate.report import junit_xml, print_verdict, summary_markdown
 from hippodrome.eval.results import ErrorSummary, LocalizationSummary, Network, Results, Row, ScenarioResult, write_results
 from hippodrome.sim.scenario import Scenario, load_scenario
 
@@ -145,11 +148,60 @@ def test_too_few_pairs_are_refused():
         compare(cells(towns=("rural",), seeds=(1, 2)), cells(towns=("rural",), seeds=(1, 2)))
 
 
-def test_the_question_is_the_scenario_without_the_answers():
-    configuration = json.loads(Scenario(name="a").model_dump_json())
-    tuned = {**configuration, "mapper": {"other": 1}, "thresholds": {}}
-    assert question_of(tuned) == question_of(configuration)
-    assert question_of({**configuration, "seed": 2}) != question_of(configuration)
+def test_one_lost_street_among_many_fails_though_the_mean_forgives_it():
+    """A pair ten times as bad widens the t-test's own error bar, so that the test alone would pass it."""
+
+    def change(scenario, seed, method, name, value):
+        return value * 10.0 if (scenario, seed, method, name) == ("grid", 2, "topometric", "APE mean (m)") else value
+
+    verdict = compare(cells(change), cells())
+    assert regressed(verdict) == set()
+    assert not verdict.passed
+    (line,) = verdict.lost
+    assert line.startswith("'grid', seed 2, 'topometric': APE mean (m) was ")
+
+
+def test_a_doubled_error_inside_the_lane_is_left_to_the_mean():
+    def change(scenario, seed, method, name, value):
+        return 0.4 if (scenario, seed, method, name) == ("grid", 2, "topometric", "APE mean (m)") else value
+
+    then = cells(lambda *place: 0.15 if place[:4] == ("grid", 2, "topometric", "APE mean (m)") else place[-1])
+    assert compare(cells(change), then).lost == ()
+
+
+def test_the_table_of_what_moved_fits_80_columns():
+    screen = io.StringIO()
+    print_verdict(compare(cells(lambda *place: place[-1] * 123.4), cells()), (), Console(file=screen, width=80))
+    rows = [line.strip() for line in screen.getvalue().splitlines() if line.startswith(" topometric (paper)")]
+    assert [line.split()[2] for line in rows] == ["APE", "RPE", "localization"]
+    assert all(line.endswith("x 123   WORSE") for line in rows)
+    assert len(screen.getvalue().splitlines()) < 30
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_power_is_told_from_the_baseline_alone(method):
+    trials = {(trial.shaken, trial.planted): trial.failed for trial in power_of(cells(seeds=(1, 2), towns=TOWNS[:3]), method, 10)}
+    assert trials[0.0, 0.0] == 0.0
+    assert trials[0.0, 0.1] == trials[0.01, 0.1] == trials[0.01, 0.5] == 1.0
+    assert trials[0.01, 0.0] == 0.0
+
+
+def test_power_as_a_command(tmp_path, capsys):
+    write_baseline(tmp_path / "b.json", cells(seeds=(1,), towns=TOWNS[:3]))
+    assert main(["gate", "--power", "--baseline", str(tmp_path / "b.json")]) == 0
+    said = capsys.readouterr().out
+    assert "topometric, 3 pairs" in said and "APE +10%" in said
+    assert main(["gate", "--baseline", str(tmp_path / "b.json")]) == 2
+
+
+def test_the_question_is_the_scenario_without_the_answers_and_what_was_driven():
+    def question(frames=100, km=1.0, **changed):
+        configuration = {**json.loads(Scenario(name="a").model_dump_json()), **changed}
+        fields = {"name": "a", "seed": 1, "noise": "paper", "duration_s": 1.0, "rows": (), "configuration": configuration}
+        return question_of(ScenarioResult(network=Network(generator="grid", edges=1, km=km), frames=frames, **fields))
+
+    assert question(mapper={"other": 1}, thresholds={}) == question()
+    assert len({question(), question(seed=2), question(frames=101), question(km=1.1)}) == 4
 
 
 def test_baseline_round_trip_and_broken_files(tmp_path):
@@ -176,21 +228,22 @@ def test_junit_and_summary_tell_what_failed():
     assert "### Gate failed" in text and "| WORSE |" in text and "APE &lt;limit> \\| broken" in text
 
 
-def fake_evaluate(ape_m):
-    def evaluate(paths, network, seed, workers, out):
-        results = []
-        for path in paths:
-            scenario = load_scenario(path, seed=seed)
+def fake_run(ape_m):
+    def run_scenarios(scenarios, workers, out):
+        found = []
+        for scenario in scenarios:
+            seed = scenario.seed
             error = ErrorSummary(definition="APE", mean_m=ape_m + 0.01 * seed)
             row = Row(method="topometric", ape=error, localization=LocalizationSummary(definition="L", success=True))
-            results.append(ScenarioResult(name=scenario.name, seed=seed, network=Network(generator="grid", edges=1, km=1.0),
+            found.append(ScenarioResult(name=scenario.name, seed=seed, network=Network(generator="grid", edges=1, km=1.0),
                                           noise="paper", frames=1, duration_s=1.0, rows=(row,),
                                           configuration=json.loads(scenario.model_dump_json())))  # fmt: skip
         out.mkdir(parents=True, exist_ok=True)
-        write_results(out / "results.json", Results(scenarios=tuple(results)))
-        return True
+        results = Results(scenarios=tuple(found))
+        write_results(out / "results.json", results)
+        return results
 
-    return evaluate
+    return run_scenarios
 
 
 def test_command_from_baseline_to_exit_status(tmp_path, monkeypatch, capsys):
@@ -207,14 +260,14 @@ def test_command_from_baseline_to_exit_status(tmp_path, monkeypatch, capsys):
         str(tmp_path / "j.xml"),
     ]
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(summary))
-    monkeypatch.setattr(gate_run, "evaluate", fake_evaluate(0.5))
+    monkeypatch.setattr(gate_run, "run_scenarios", fake_run(0.5))
     assert main(command) == 2
     assert main([*command, "--update"]) == 0
     assert main(command) == 0
     assert "gate passed: 0 figure(s) moved" in capsys.readouterr().out
-    monkeypatch.setattr(gate_run, "evaluate", fake_evaluate(0.56))
+    monkeypatch.setattr(gate_run, "run_scenarios", fake_run(0.56))
     assert main(command) == 1
-    monkeypatch.setattr(gate_run, "evaluate", fake_evaluate(1.5))
+    monkeypatch.setattr(gate_run, "run_scenarios", fake_run(1.5))
     assert main([*command, "--update"]) == 0
     assert main(command) == 1  # no worse than the baseline, and beyond the scenario's own limit
     assert "a, seed 1: topometric: APE mean, m is 1.51, the limit is 1" in capsys.readouterr().out
@@ -234,13 +287,13 @@ def test_compare_shows_what_moved_between_two_folders(tmp_path, capsys):
     scenario = tmp_path / "a.yaml"
     scenario.write_text("name: a\n")
     for name, ape_m in (("one", 0.5), ("two", 0.6), ("same", 0.5)):
-        fake_evaluate(ape_m)([scenario], None, 1, 1, tmp_path / name)
+        fake_run(ape_m)([load_scenario(scenario)], 1, tmp_path / name)
     assert main(["compare", str(tmp_path / "one"), str(tmp_path / "two")]) == 0
     said = capsys.readouterr().out
     assert "+19.6 %" in said and "1 figure(s) moved, 0 stand still" in said
     assert main(["compare", str(tmp_path / "one"), str(tmp_path / "same")]) == 0
     assert "0 figure(s) moved, 1 stand still" in capsys.readouterr().out
     scenario.write_text("name: a\nnoise: harsh\n")
-    fake_evaluate(0.5)([scenario], None, 1, 1, tmp_path / "other")
+    fake_run(0.5)([load_scenario(scenario)], 1, tmp_path / "other")
     assert main(["compare", str(tmp_path / "one"), str(tmp_path / "other")]) == 2
     assert "the scenario has changed" in capsys.readouterr().err

@@ -12,7 +12,7 @@ import numpy as np
 
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import CognitiveMap, HippodromeError, StartPose, Trajectory
-from hippodrome.eval.baselines.rivals import Rival, rivals
+from hippodrome.eval.baselines.rivals import NO_ATTRACTOR, Rival, rivals
 from hippodrome.eval.localization_score import score_localization
 from hippodrome.eval.map_quality import closures, matched_lane_accuracy, matched_lane_ids, score_closures
 from hippodrome.eval.materials import Materials, Scored, Topometric, file_stem, gather, score_trajectory
@@ -66,7 +66,11 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
             **_counts(semi_metric),
         ),
     ]
-    rows += [_rival_row(rival, truth) for rival in rivals(materials, semi_metric.t_s)]
+    others = rivals(materials, semi_metric.t_s)
+    rows += [_rival_row(rival, truth) for rival in others]
+    scored |= {
+        one.method: one.scored for one in others if one.scored is not None and one.method != NO_ATTRACTOR
+    }  # the same poses
     found: dict[str, Topometric] = {}
     for method, mode in MODES:
         try:

@@ -113,6 +113,15 @@ def write_map_evidence(materials: Materials, scored: Mapping[str, Scored], found
     write_atomically(materials.folder / MAP_JSON, f"{evidence.model_dump_json()}\n".encode())
 
 
+def add_layers(folder: Path, scored: Mapping[str, Scored], truth: Trajectory) -> None:
+    """More methods into the ``map.json`` of a scenario's folder, in place of those of the same name."""
+    evidence = read_map_evidence(folder / MAP_JSON)
+    kept = [layer for layer in evidence.methods if layer.name not in scored]
+    layers = [*kept, *(_layer(method, one, truth) for method, one in scored.items())]
+    text = evidence.model_copy(update={"methods": layers}).model_dump_json()
+    write_atomically(folder / MAP_JSON, f"{text}\n".encode())
+
+
 def read_map_evidence(path: Path) -> MapEvidence:
     """Read and validate. Raises ResultsError."""
     try:

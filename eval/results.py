@@ -15,7 +15,7 @@ from hippodrome.proto.atomic import write_atomically
 
 DECIMALS = 6  # micrometres and nanoseconds: below any meaning, above rounding noise between machines
 MAX_BYTES = 64 << 20
-TIMING_FIELDS: Final = frozenset({"cpu_percent", "initial_time_ms", "timings"})
+TIMING_FIELDS: Final = frozenset({"cpu_percent", "peak_rss_bytes", "initial_time_ms", "timings"})
 
 
 class ResultsError(HippodromeError):
@@ -78,6 +78,7 @@ class Row(_Model):
     failure: str | None = None
     cpu_percent: float | None = None  # process CPU time / duration of the drive
     map_bytes: int | None = None
+    peak_rss_bytes: int | None = None  # of a process of its own, all of it
     camera_frames: int | None = None
     keyframes: int | None = None
     vertices: int | None = None

@@ -23,22 +23,28 @@ def draw_scenario(
     materials: Materials, semi_metric: CognitiveMap, scored: Mapping[str, Scored], found: Mapping[str, Topometric]
 ) -> None:
     """Maps over ground truth, errors along the drive, localization, frames."""
-    folder, name, truth = materials.folder, materials.scenario.name, materials.mapping.ground_truth()
+    folder, name = materials.folder, materials.scenario.name
     frames, captions = _contact_sheet(materials.mapping)
     draw_contact_sheet(folder / "frames.png", frames, captions, title=f"{name}: the mapping drive as the camera sees it")
     draw_cognitive_map(folder / "semi-metric-map.png", semi_metric, f"{name}: semi-metric map, as built")
-    absolute, relative = ({method: getattr(one, field) for method, one in scored.items()} for field in ("ape", "rpe"))
-    draw_error_profiles(folder / "errors.png", absolute, relative, f"{name}: errors along the drive")
-    draw_error_violins(folder / "violins.png", absolute, relative, f"{name}: distribution of errors")
-    placed = {method: _placed(one, truth) for method, one in scored.items()}
-    draw_maps_over_truth(folder / "maps.png", materials.roads, truth.poses, placed, f"{name}: maps over ground truth")
+    draw_methods(materials, scored)
     for method, one in found.items():
         _draw_topometric(materials, method, one)
     if found:
         _draw_neurodynamics(materials, *list(found.items())[-1])
 
 
-def _placed(one: Scored, truth: Trajectory) -> FloatArray:
+def draw_methods(materials: Materials, scored: Mapping[str, Scored]) -> None:
+    """All methods beside one another: errors along the drive, their distribution, maps over ground truth."""
+    folder, name, truth = materials.folder, materials.scenario.name, materials.mapping.ground_truth()
+    absolute, relative = ({method: getattr(one, field) for method, one in scored.items()} for field in ("ape", "rpe"))
+    draw_error_profiles(folder / "errors.png", absolute, relative, f"{name}: errors along the drive")
+    draw_error_violins(folder / "violins.png", absolute, relative, f"{name}: distribution of errors")
+    maps_m = {method: placed(one, truth) for method, one in scored.items()}
+    draw_maps_over_truth(folder / "maps.png", materials.roads, truth.poses, maps_m, f"{name}: maps over ground truth")
+
+
+def placed(one: Scored, truth: Trajectory) -> FloatArray:
     """Positions (V, 2) in the network frame, placed as they were for scoring."""
     pairs = associate(one.trajectory, truth)
     transform = find_alignment(one.alignment, pairs.estimate, pairs.reference)

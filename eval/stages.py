@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
-from typing import Literal
+from typing import Literal, Protocol, TypeVar
 
 import numpy as np
 
@@ -35,6 +35,8 @@ from hippodrome.sim.network import read_network
 from hippodrome.sim.recording import open_recording
 from hippodrome.sim.scenario import Scenario, load_scenario
 
+MapT_co = TypeVar("MapT_co", covariant=True)
+
 
 @dataclass(frozen=True, slots=True)
 class Localization:
@@ -44,16 +46,29 @@ class Localization:
     step_s: FloatArray  # (N,) process CPU time
 
 
+class MapBuilder(Protocol[MapT_co]):
+    """What takes observations one by one and then has a map."""
+
+    def step(self, observation: Observation, /) -> object: ...
+
+    def finish(self) -> MapT_co: ...
+
+
 def map_recording(observations: Iterable[Observation], config: MapperConfig) -> tuple[CognitiveMap, float]:
     """The semi-metric map and the CPU seconds that it took."""
-    mapper, cpu_s = Mapper(config), 0.0
+    return built(Mapper(config), observations)
+
+
+def built(builder: MapBuilder[MapT_co], observations: Iterable[Observation]) -> tuple[MapT_co, float]:
+    """The builder's map and the CPU seconds that it took."""
+    cpu_s = 0.0
     for observation in observations:
         began = process_time()
-        mapper.step(observation)
+        builder.step(observation)
         cpu_s += process_time() - began
     began = process_time()
-    cognitive_map = mapper.finish()
-    return cognitive_map, cpu_s + process_time() - began
+    finished = builder.finish()
+    return finished, cpu_s + process_time() - began
 
 
 def refine_map(

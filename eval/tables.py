@@ -71,6 +71,7 @@ MAPPING_COLUMNS = (
     Column("Method", _method),
     Column("CPU (%)", lambda row: _figure(row.cpu_percent)),
     Column("Map (MB)", _map_size),
+    Column("Peak RSS (MB)", lambda row: NONE if row.peak_rss_bytes is None else f"{row.peak_rss_bytes / MEGABYTE:.0f}"),
     Column("Frames", lambda row: _count(row.camera_frames)),
     Column("Keyframes", lambda row: _count(row.keyframes)),
     Column("Vertices", lambda row: _count(row.vertices)),

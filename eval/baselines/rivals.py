@@ -12,7 +12,6 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
-from time import process_time
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import AttractorStates, CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
 from hippodrome.eval.baselines.ratslam.system import RatSlam, RatSlamConfig, RatSlamMap
 from hippodrome.eval.materials import Materials, Scored, file_stem, score_trajectory
+from hippodrome.eval.stages import built
 from hippodrome.eval.trajectory_io import write_tum
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.proto.codec import save_map
@@ -90,24 +90,12 @@ def _rival(method: str, trajectory: Trajectory, materials: Materials, cpu_s: flo
 def run_ratslam(observations: Iterable[Observation], config: RatSlamConfig | None = None) -> tuple[RatSlamMap, float]:
     """RatSLAM's map and the CPU seconds that it took, measured as the mapper's are."""
     _warm_up()
-    system, cpu_s = RatSlam(config or RatSlamConfig()), 0.0
-    for observation in observations:
-        began = process_time()
-        system.step(observation)
-        cpu_s += process_time() - began
-    return system.finish(), cpu_s
+    return built(RatSlam(config or RatSlamConfig()), observations)
 
 
 def map_without_attractor(observations: Iterable[Observation], config: MapperConfig) -> tuple[CognitiveMap, float]:
     """The semi-metric map without the networks' states, and the CPU seconds that it took."""
-    mapper, cpu_s = MapperWithoutAttractor(config), 0.0
-    for observation in observations:
-        began = process_time()
-        mapper.step(observation)
-        cpu_s += process_time() - began
-    began = process_time()
-    cognitive_map = mapper.finish()
-    cpu_s += process_time() - began
+    cognitive_map, cpu_s = built(MapperWithoutAttractor(config), observations)
     return replace(cognitive_map, attractors=_no_states(len(cognitive_map.t_s))), cpu_s
 
 

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from pydantic import BaseModel
 
-from hippodrome.core.types import CognitiveMap, HippodromeError, Observation, Trajectory
-from hippodrome.eval.localization_score import score_localization
-from hippodrome.eval.materials import Materials
+from hippodrome.core.types import CognitiveMap, HippodromeError, LocalizationEstimate, Observation, Trajectory
+from hippodrome.eval.localization_score import LocalizationScore, score_localization
+from hippodrome.eval.materials import Materials, file_stem
 from hippodrome.eval.metrics import path_length_m
 from hippodrome.eval.paper_rows import INITIAL_TIME_MS, LOCALIZATION_ERROR_M, ORB_SLAM3, SEQUENCE_LENGTH_M, TOPOMETRIC
 from hippodrome.eval.results import LocalizationSummary, summarize_localization, to_json
 from hippodrome.eval.stages import localize_recording
+from hippodrome.eval.trajectory_io import write_tum
 from hippodrome.eval.warm_up import warm_up
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.proto.codec import load_map
+from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import Recording
 
 MAPS = {"topometric (paper)": "topometric-paper.pbstream", "topometric": "topometric-default.pbstream"}
+TABLE_TWO = "table2.json"
 
 
 class SequenceRow(BaseModel):
@@ -34,27 +39,59 @@ class SequenceRow(BaseModel):
     localization: LocalizationSummary | None = None
 
 
-def table_two(materials: Materials, lengths_m: Sequence[float] = SEQUENCE_LENGTH_M) -> list[SequenceRow]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Located:
+    """A row, and the errors that it sums up, if there are any."""
+
+    row: SequenceRow
+    score: LocalizationScore | None = None
+
+
+def table_two(materials: Materials, lengths_m: Sequence[float] = SEQUENCE_LENGTH_M) -> list[Located]:
     """Every sequence in every map of the scenario's folder."""
     warm_up()
-    rows = []
+    found = []
     for method, name in MAPS.items():
         path = materials.folder / name
         cognitive_map = load_map(path)[0] if path.exists() else None
         for number, length_m in enumerate(lengths_m, start=1):
-            rows.append(_row(method, number, length_m, len(lengths_m), cognitive_map, materials))
-    return rows
+            row = SequenceRow(method=method, number=number, length_m=length_m)
+            found.append(_located(row, len(lengths_m), cognitive_map, materials))
+    return found
 
 
-def write_table_two(folder: Path, rows: Sequence[SequenceRow]) -> None:
-    """``table2.json`` and ``table2.md``."""
-    write_atomically(folder / "table2.json", to_json([row.model_dump(mode="python") for row in rows]).encode())
-    write_atomically(folder / "table2.md", table_two_markdown(rows).encode())
+def located(
+    row: SequenceRow, first: int, estimates: Sequence[LocalizationEstimate], score: LocalizationScore, to: Path
+) -> Located:
+    """The finished row; the poses that it vouched for go to a file, for whoever wants to compute the error again."""
+    known = [estimate for estimate in estimates if estimate.localized]
+    if known:
+        poses = np.stack([estimate.pose for estimate in known])
+        write_tum(sequence_file(to, row), Trajectory(np.array([e.t_s for e in known]), poses))
+    return Located(row.model_copy(update={"first_step": first, "localization": summarize_localization(score)}), score)
 
 
-def cut(recording: Recording, number: int, of: int, length_m: float) -> tuple[int, int]:
+def sequence_file(folder: Path, row: SequenceRow) -> Path:
+    """Where a sequence's poses are, in the network frame."""
+    return folder / "sequences" / f"{file_stem(row.method)}-{row.number}.tum"
+
+
+def write_table_two(out: Path, name: str, rows: Sequence[SequenceRow]) -> None:
+    """``NAME/table2.json`` and ``table2.md``."""
+    write_atomically(out / name / TABLE_TWO, to_json([row.model_dump(mode="python") for row in rows]).encode())
+    write_atomically(out / "table2.md", table_two_markdown(rows).encode())
+
+
+class Sampled(Protocol):
+    """A recorded drive, whatever its frames are."""
+
+    @property
+    def samples(self) -> Samples: ...
+
+
+def cut(drive: Sampled, number: int, of: int, length_m: float) -> tuple[int, int]:
     """Steps [first, end) of sequence ``number``: the starts spread evenly over the drive. Raises HippodromeError."""
-    way_m = path_length_m(recording.samples.poses_m)
+    way_m = path_length_m(drive.samples.poses_m)
     room_m = float(way_m[-1]) - length_m
     if room_m < 0.0:
         raise HippodromeError(f"the localization drive is {way_m[-1]:.0f} m long, the sequence {length_m:g} m")
@@ -65,47 +102,53 @@ def cut(recording: Recording, number: int, of: int, length_m: float) -> tuple[in
 
 def table_two_markdown(rows: Sequence[SequenceRow]) -> str:
     """A line a sequence; the published figures beside ours."""
-    head = ["Method", "Sequence", "Length (m)", "Success", "First fix (ms)", "First fix (m driven)", "Error (m)", "False fixes"]
-    lines = [head, ["---", *["---:"] * (len(head) - 1)], *(_cells(row) for row in rows)]
-    for method in (ORB_SLAM3, TOPOMETRIC):
-        figures = zip(SEQUENCE_LENGTH_M, INITIAL_TIME_MS[method], LOCALIZATION_ERROR_M[method], strict=True)
-        for number, (length_m, time_ms, error_m) in enumerate(figures, start=1):
-            lines.append([f"{method} †", str(number), f"{length_m:g}", "-", f"{time_ms:g}", "-", f"{error_m:g}", "-"])
+    lines = [[*HEAD], ["---", *["---:"] * (len(HEAD) - 1)], *(sequence_cells(row) for row in rows), *quoted_cells()]
     failures = [f"- {row.method}, sequence {row.number}: FAILED: {row.failure}" for row in rows if row.failure is not None]
-    note = "† quoted from the paper, other drives in another simulator; not measured here"
-    return "\n".join([*(f"| {' | '.join(line)} |" for line in lines), "", *failures, note, ""])
+    return "\n".join([*(f"| {' | '.join(line)} |" for line in lines), "", *failures, QUOTED, ""])
 
 
-def _row(
-    method: str, number: int, length_m: float, of: int, cognitive_map: CognitiveMap | None, materials: Materials
-) -> SequenceRow:
-    row = SequenceRow(method=method, number=number, length_m=length_m)
-    if cognitive_map is None:
-        return row.model_copy(update={"failure": "no map: the refinement failed"})
-    drive = materials.drive
-    try:
-        first, end = cut(drive, number, of, length_m)
-        run = localize_recording(_observations(drive, first, end), cognitive_map, materials.roads, materials.scenario.localizer)
-        truth = Trajectory(drive.samples.t_s[first:end], drive.samples.poses_m[first:end])
-        summary = summarize_localization(score_localization(run.estimates, truth, run.step_s))
-    except HippodromeError as error:
-        return row.model_copy(update={"failure": str(error)})
-    return row.model_copy(update={"first_step": first, "localization": summary})
+HEAD = ("Method", "Sequence", "Length (m)", "Success", "First fix (ms)", "First fix (m driven)", "Error (m)", "False fixes")
+QUOTED = "† quoted from the paper, other drives in another simulator; not measured here"
 
 
-def _observations(recording: Recording, first: int, end: int) -> Iterator[Observation]:
-    for i in range(first, end):
-        number = int(recording.samples.frame[i])
-        yield recording.samples.observation(i, recording.frame(number) if number >= 0 else None)
-
-
-def _cells(row: SequenceRow) -> list[str]:
+def sequence_cells(row: SequenceRow) -> list[str]:
+    """A row in words."""
     found = row.localization
     head = [row.method, str(row.number), f"{row.length_m:g}"]
     if found is None:
         return [*head, "FAILED", "-", "-", "-", "-"]
     figures = [_figure(value) for value in (found.initial_time_ms, found.initial_distance_m, found.error_mean_m)]
     return [*head, "yes" if found.success else "NO", *figures, str(found.false_fixes)]
+
+
+def quoted_cells() -> list[list[str]]:
+    """The published table, in the same columns."""
+    lines = []
+    for method in (ORB_SLAM3, TOPOMETRIC):
+        figures = zip(SEQUENCE_LENGTH_M, INITIAL_TIME_MS[method], LOCALIZATION_ERROR_M[method], strict=True)
+        for number, (length_m, time_ms, error_m) in enumerate(figures, start=1):
+            lines.append([f"{method} †", str(number), f"{length_m:g}", "-", f"{time_ms:g}", "-", f"{error_m:g}", "-"])
+    return lines
+
+
+def _located(row: SequenceRow, of: int, cognitive_map: CognitiveMap | None, materials: Materials) -> Located:
+    if cognitive_map is None:
+        return Located(row.model_copy(update={"failure": "no map: the refinement failed"}))
+    drive = materials.drive
+    try:
+        first, end = cut(drive, row.number, of, row.length_m)
+        run = localize_recording(_observations(drive, first, end), cognitive_map, materials.roads, materials.scenario.localizer)
+        truth = Trajectory(drive.samples.t_s[first:end], drive.samples.poses_m[first:end])
+        score = score_localization(run.estimates, truth, run.step_s)
+    except HippodromeError as error:
+        return Located(row.model_copy(update={"failure": str(error)}))
+    return located(row, first, run.estimates, score, materials.folder)
+
+
+def _observations(recording: Recording, first: int, end: int) -> Iterator[Observation]:
+    for i in range(first, end):
+        number = int(recording.samples.frame[i])
+        yield recording.samples.observation(i, recording.frame(number) if number >= 0 else None)
 
 
 def _figure(value: float | None) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from hippodrome.eval.figures.style import (
     FAINT,
     FLOOR_M,
     GREEN,
+    SERIES,
     TRUTH,
     VERMILION,
     Axes,
@@ -23,7 +24,7 @@ from hippodrome.eval.figures.style import (
     save_figure,
     tidy,
 )
-from hippodrome.eval.localization_score import FALSE_FIX_M
+from hippodrome.eval.localization_score import FALSE_FIX_M, LocalizationScore
 
 SHEET_SIZE = 48
 RING_SIZE = 72
@@ -47,6 +48,24 @@ def draw_localization_error(
     tidy(axes, "time (s)", "position error (m)", title)
     log_errors(axes, errors_m)
     axes.set_xlim(t_s[0], t_s[-1])
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
+    save_figure(figure, path)
+
+
+def draw_localization_comparison(path: Path, scores: Mapping[str, LocalizationScore], title: str = "") -> None:
+    """Position error of several methods over the same time, where each vouches for it; a mark at each one's first fix."""
+    figure = new_figure(9.0, 3.6)
+    axes = figure.subplots()
+    start_s = min(score.t_s[0] for score in scores.values())
+    for (method, score), colour in zip(scores.items(), SERIES, strict=False):
+        vouched_m = np.where(score.localized, np.maximum(score.errors_m, FLOOR_M), np.nan)
+        mean = "never localized" if score.error_mean_m is None else f"mean {score.error_mean_m:.2f} m"
+        axes.plot(score.t_s - start_s, vouched_m, color=colour, linewidth=1.2, label=f"{method}: {mean}")
+        if score.initial_drive_s is not None:
+            axes.axvline(score.t_s[0] - start_s + score.initial_drive_s, color=colour, linewidth=0.9, linestyle=":")
+    axes.axhline(FALSE_FIX_M, color=FAINT, linewidth=0.8, linestyle="--", label=f"false fix beyond {FALSE_FIX_M:g} m")
+    tidy(axes, "time since the first frame (s); dotted: first fix", "position error (m)", title)
+    log_errors(axes, np.concatenate([score.errors_m[score.localized] for score in scores.values()]))
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
     save_figure(figure, path)
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from hippodrome.core.types import HippodromeError, Trajectory
+from hippodrome.eval.baselines.orbslam3.pairs import StereoDrive
 from hippodrome.eval.baselines.orbslam3.poses import thinned
-from hippodrome.eval.baselines.orbslam3.tracker import Run, StereoDrive, run_figures
+from hippodrome.eval.baselines.orbslam3.tracker import Run, run_figures
 from hippodrome.eval.metrics import ape, rpe
 from hippodrome.eval.results import Row, summarize
 from hippodrome.eval.trajectory_io import write_tum
@@ -31,7 +32,7 @@ def rows(runs: Sequence[Run], drive: StereoDrive) -> list[Row]:
 
 
 def _row(method: str, which: Which, runs: Sequence[Run], drive: StereoDrive) -> Row:
-    truth = drive.recording.ground_truth()
+    truth = drive.truth()
     scored: list[tuple[float, Run, Trajectory]] = []
     reports: list[dict[str, object]] = []
     for run in runs:
@@ -43,7 +44,7 @@ def _row(method: str, which: Which, runs: Sequence[Run], drive: StereoDrive) -> 
                 error_m = ape(samples, truth, "se2").mean_m
                 report["ape_se2_m"] = error_m
                 scored.append((error_m, run, samples))
-                write_tum(_tum(run, which), samples)
+                write_tum(tum_path(run, which), samples)
             except HippodromeError as error:
                 report["failure"] = str(error)
         reports.append(report)
@@ -55,7 +56,8 @@ def _row(method: str, which: Which, runs: Sequence[Run], drive: StereoDrive) -> 
     return Row(method=method, **_errors(samples, truth), **_costs(median, drive), **spread)
 
 
-def _tum(run: Run, which: Which) -> Path:
+def tum_path(run: Run, which: Which) -> Path:
+    """The scored samples of a run."""
     return run.folder / f"body-{which}.tum"
 
 

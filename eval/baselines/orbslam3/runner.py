@@ -1,10 +1,15 @@
 """Runs in the tracker's own environment, by that environment's Python: imports nothing of hippodrome.
 
-    python runner.py VOCABULARY.txt SETTINGS.yaml WIDTH HEIGHT PACED < frames
+    python runner.py JOB.json < frames
 
-Standard input: per frame the time stamp (float64, little endian), then the left and the right image, grey bytes. The working
-directory receives ``live.tum`` (each pose as it was when its frame came), ``final.tum`` and ``keyframes.tum`` (after all
-optimisation) and, last of all, ``result.json``: without it the run did not end well.
+The job names vocabulary, settings, width, height, whether to pace the frames, and whether to localize in the map that the
+settings load. Standard input: per frame the time stamp (float64, little endian), then the left and the right image, grey bytes.
+The working directory receives ``live.tum`` (each pose as it was when its frame came), ``steps.txt`` (per frame: time stamp,
+whether tracked, whether in the loaded map, CPU seconds so far), when mapping also ``final.tum`` and ``keyframes.tum`` (after all
+optimisation), and, last of all, ``result.json``: without it the run did not end well.
+
+To localize, the tracker maps until it has merged with the loaded map, and tracks in that map alone from then on: in localization
+mode from the first frame it searches its own new and empty map only.
 """
 
 import json
@@ -22,38 +27,44 @@ SETTLE_S = 5.0  # for local mapping and loop closing, which run behind the track
 
 def main() -> None:
     """Track every frame of standard input, save, report."""
-    vocabulary, settings, width, height, paced = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), sys.argv[5] == "1"
-    slam = Slam(vocabulary, settings, Sensor.STEREO, use_viewer=False)
+    job = json.loads(Path(sys.argv[1]).read_text())
+    slam = Slam(job["vocabulary"], job["settings"], Sensor.STEREO, use_viewer=False)
     loaded_s, began = cpu_s(), time.monotonic()
     live: list[str] = []
-    frames, first_t_s, longest_s = 0, 0.0, 0.0
-    while (pair := read_pair(sys.stdin.buffer, width, height)) is not None:
+    steps: list[str] = []
+    first_t_s, longest_s, merged = None, 0.0, False
+    while (pair := read_pair(sys.stdin.buffer, job["width"], job["height"])) is not None:
         t_s, left, right = pair
-        first_t_s = t_s if frames == 0 else first_t_s
-        if paced:
+        first_t_s = t_s if first_t_s is None else first_t_s
+        if job["paced"]:
             time.sleep(max(0.0, began + t_s - first_t_s - time.monotonic()))
         asked = time.monotonic()
         result = slam.track_stereo(left, right, t_s)
         longest_s = max(longest_s, time.monotonic() - asked)
-        frames += 1
+        steps.append(f"{t_s!r} {int(result.ok)} {int(merged)} {cpu_s() - loaded_s:.6f}")
         if result.ok:
             live.append(tum_line(t_s, np.asarray(result.pose_wc, dtype=np.float64)))
-    time.sleep(SETTLE_S)
-    tracked_s, wall_s = cpu_s(), time.monotonic() - began
+        if job["localize"] and not merged and slam.map_changed() and len(steps) > 1:
+            merged = True  # from the next frame on, poses are the loaded map's
+            slam.activate_localization_mode()
+    if not job["localize"]:
+        time.sleep(SETTLE_S)
+    tracked_s, wall_s, memory = cpu_s(), time.monotonic() - began, peak_rss_bytes()
     slam.shutdown()
     Path("live.tum").write_text("\n".join(live) + "\n")
-    if live:
+    Path("steps.txt").write_text("\n".join(steps) + "\n")
+    if live and not job["localize"]:
         slam.save_trajectory_tum("final.tum")
         slam.save_keyframe_trajectory_tum("keyframes.tum")
-    atlas = sorted(Path().glob("*.osa"))
+    atlas = [] if job["localize"] else sorted(Path().glob("*.osa"))
     report = {
-        "frames": frames,
+        "frames": len(steps),
         "tracked": len(live),
         "cpu_s": tracked_s - loaded_s,
         "loading_cpu_s": loaded_s,
         "wall_s": wall_s,
         "longest_frame_s": longest_s,
-        "peak_rss_bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
+        "peak_rss_bytes": memory,
         "map_bytes": atlas[0].stat().st_size if atlas else None,
     }
     Path("result.json").write_text(json.dumps(report, indent=1) + "\n")
@@ -91,6 +102,12 @@ def cpu_s() -> float:
     """User and system time of this process, all threads."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
     return usage.ru_utime + usage.ru_stime
+
+
+def peak_rss_bytes() -> int:
+    """Of this program: the kernel's ``ru_maxrss`` would count the process that started it as well."""
+    status = Path("/proc/self/status").read_text()
+    return 1024 * int(status.split("VmHWM:")[1].split()[0])
 
 
 if __name__ == "__main__":

@@ -21,8 +21,8 @@ VIEWER = {
 }
 
 
-def settings_text(camera: CameraSpec) -> str:
-    """The YAML, OpenCV's dialect. The focal length is the camera's, the principal point its middle, there is no distortion."""
+def settings_text(camera: CameraSpec, localize: bool = False) -> str:
+    """The YAML, OpenCV's dialect: pinhole without distortion; the map is saved at the end, or loaded in order to localize."""
     if camera.stereo_baseline_m is None:
         raise HippodromeError("ORB-SLAM3: camera.stereo_baseline_m is not set, a stereo pair needs a baseline")
     focal_px = camera.focal_px()
@@ -45,7 +45,7 @@ def settings_text(camera: CameraSpec) -> str:
         "ORBextractor.nLevels": 8,
         "ORBextractor.iniThFAST": 20,
         "ORBextractor.minThFAST": 7,
-        "System.SaveAtlasToFile": f'"{ATLAS}"',
+        f"System.{'Load' if localize else 'Save'}Atlas{'From' if localize else 'To'}File": f'"{ATLAS}"',
         **{f"Viewer.{name}": value for name, value in VIEWER.items()},
     }
     return "%YAML:1.0\n" + "".join(f"{name}: {value}\n" for name, value in values.items())

@@ -9,49 +9,35 @@ import contextlib
 import json
 import subprocess
 import threading
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO
 
-import cv2
 import numpy as np
 
-from hippodrome.core.types import Frame, HippodromeError, Trajectory
+from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
+from hippodrome.eval.baselines.orbslam3.pairs import StereoDrive
 from hippodrome.eval.baselines.orbslam3.poses import read_camera_tum
-from hippodrome.eval.baselines.orbslam3.settings import settings_text
+from hippodrome.eval.baselines.orbslam3.settings import ATLAS, settings_text
 from hippodrome.proto.atomic import write_atomically
-from hippodrome.sim.recording import Recording
-from hippodrome.sim.render.camera import CameraSpec
 
 RUNNER = Path(__file__).with_name("runner.py")
-LIMIT_BASE_S, LIMIT_PER_FRAME_S = 180.0, 0.8  # it takes 0.07 s a frame on a free core; ten times that is a hang
+LIMIT_BASE_S, LIMIT_PER_FRAME_S = 300.0, 0.8  # it takes 0.07 s a frame on a free core; ten times that is a hang
 NEW_MAP = "New Map created"  # in the log: at the start, and whenever it gave up looking for where it was
 LEAST_TRACKED = 0.5  # of the frames: below, the run counts as lost
 
 
 @dataclass(frozen=True, slots=True)
-class StereoDrive:
-    """The first ``frames`` stereo pairs of a drive; the recording itself may be unfinished beyond them."""
+class RunTask:
+    """What to run, and where: a drive to map, or one to localize in the map of a finished run."""
 
-    recording: Recording
-    camera: CameraSpec
-    frames: int
-
-    @property
-    def times_s(self) -> list[float]:
-        samples = self.recording.samples
-        return [float(t_s) for t_s in samples.t_s[samples.frame_steps[: self.frames]]]
-
-    @property
-    def duration_s(self) -> float:
-        return self.times_s[-1]
-
-    def pairs(self) -> Iterator[bytes]:
-        """Time stamp and both grey images of each frame, as the runner reads them."""
-        for number, t_s in enumerate(self.times_s):
-            left, right = (_grey(self.recording.frame(number, side)) for side in ("", "r"))
-            yield np.float64(t_s).astype("<f8").tobytes() + left.tobytes() + right.tobytes()
+    python: Path
+    vocabulary: Path
+    drive: StereoDrive
+    folder: Path
+    paced: bool = False
+    limit_s: float | None = None  # None: by the number of frames
+    loaded: Path | None = None  # folder of the run whose map is loaded
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +54,15 @@ class RunFigures:
     map_bytes: int | None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Steps:
+    """What became of each of N frames."""
+
+    t_s: FloatArray  # (N,)
+    in_map: FloatArray  # (N,) 1.0: tracked in the loaded map
+    cpu_s: FloatArray  # (N,) of the process, up to and including the frame
+
+
 @dataclass(frozen=True, slots=True)
 class Run:
     """A finished run, or why it is none."""
@@ -75,21 +70,23 @@ class Run:
     folder: Path
     failure: str | None = None
     figures: RunFigures | None = None
-    live: Trajectory | None = None  # body poses, in the frame of the first one
+    live: Trajectory | None = None  # body poses, in the frame of the first one, or of the loaded map
     final: Trajectory | None = None
     keyframes: int | None = None
     maps_started: int | None = None  # more than one: it lost its way; maps that never merged lie anywhere to each other
+    steps: Steps | None = None
 
 
-def run_tracker(python: Path, vocabulary: Path, drive: StereoDrive, folder: Path, paced: bool = False) -> Run:
-    """The tracker over the drive; a run whose ``result.json`` is in ``folder`` already is read back instead."""
+def run_tracker(task: RunTask) -> Run:
+    """The tracker over the drive; a run whose ``result.json`` is in its folder already is read back instead."""
+    folder, drive = task.folder, task.drive
     folder.mkdir(parents=True, exist_ok=True)
     if not (folder / "result.json").exists():
-        write_atomically(folder / "settings.yaml", settings_text(drive.camera).encode())
-        if failure := _execute(python, vocabulary, drive, folder, paced):
+        write_atomically(folder / "settings.yaml", settings_text(drive.camera, task.loaded is not None).encode())
+        if failure := _execute(task):
             return Run(folder, failure)
     try:
-        run = read_run(folder, drive.camera)
+        run = read_run(folder, drive.camera.forward_m, mapped=task.loaded is None)
     except (HippodromeError, OSError, ValueError, TypeError) as error:
         return Run(folder, f"unreadable result: {error}")
     if run.figures is not None and run.figures.frames != drive.frames:
@@ -97,15 +94,19 @@ def run_tracker(python: Path, vocabulary: Path, drive: StereoDrive, folder: Path
     return run
 
 
-def read_run(folder: Path, camera: CameraSpec) -> Run:
-    """A run from its files."""
+def read_run(folder: Path, forward_m: float, mapped: bool = True) -> Run:
+    """A run from its files; one that localized has no final trajectory."""
     figures = RunFigures(**json.loads((folder / "result.json").read_text()))
     if figures.tracked < LEAST_TRACKED * figures.frames:
         return Run(folder, f"lost: {figures.tracked} of {figures.frames} frames tracked", figures)
-    live, final = (read_camera_tum(folder / f"{name}.tum", camera.forward_m) for name in ("live", "final"))
-    keyframes = len(read_camera_tum(folder / "keyframes.tum", camera.forward_m).t_s)
+    live = read_camera_tum(folder / "live.tum", forward_m)
     maps_started = (folder / "log.txt").read_text(errors="replace").count(NEW_MAP)
-    return Run(folder, None, figures, live, final, keyframes, maps_started)
+    t_s, tracked, in_map, cpu_s = np.loadtxt(folder / "steps.txt", ndmin=2).T
+    run = Run(folder, None, figures, live, maps_started=maps_started, steps=Steps(t_s, tracked * in_map, cpu_s))
+    if not mapped:
+        return run
+    keyframes = len(read_camera_tum(folder / "keyframes.tum", forward_m).t_s)
+    return replace(run, final=read_camera_tum(folder / "final.tum", forward_m), keyframes=keyframes)
 
 
 def run_figures(run: Run) -> dict[str, object]:
@@ -114,18 +115,19 @@ def run_figures(run: Run) -> dict[str, object]:
     return {**head, **(asdict(run.figures) if run.figures else {})}
 
 
-def _execute(python: Path, vocabulary: Path, drive: StereoDrive, folder: Path, paced: bool) -> str | None:
+def _execute(task: RunTask) -> str | None:
     """Start, feed and await the runner; the cause if it failed."""
-    camera = drive.camera
-    sizes = [str(camera.width), str(camera.height), str(int(paced))]
-    command = [str(python), str(RUNNER.absolute()), str(vocabulary.absolute()), "settings.yaml", *sizes]
-    limit_s = LIMIT_BASE_S + LIMIT_PER_FRAME_S * drive.frames + (drive.duration_s if paced else 0.0)
-    with (folder / "log.txt").open("wb") as log:
+    _write_job(task)
+    command = [str(task.python), str(RUNNER.absolute()), "job.json"]
+    paced_s = task.drive.duration_s if task.paced else 0.0
+    limit_s = task.limit_s or LIMIT_BASE_S + LIMIT_PER_FRAME_S * task.drive.frames + paced_s
+    log_path = task.folder / "log.txt"
+    with log_path.open("wb") as log:
         try:
-            process = subprocess.Popen(command, cwd=folder, stdin=subprocess.PIPE, stdout=log, stderr=subprocess.STDOUT)
+            process = subprocess.Popen(command, cwd=task.folder, stdin=subprocess.PIPE, stdout=log, stderr=subprocess.STDOUT)
         except OSError as error:
             return f"cannot be started: {error}"
-        feeder = threading.Thread(target=_feed, args=(process.stdin, drive), daemon=True)
+        feeder = threading.Thread(target=_feed, args=(process.stdin, task.drive), daemon=True)
         feeder.start()
         try:
             status = process.wait(limit_s)
@@ -135,9 +137,26 @@ def _execute(python: Path, vocabulary: Path, drive: StereoDrive, folder: Path, p
             process.kill()
             process.wait()
             feeder.join()
-    if status == 0 and (folder / "result.json").exists():
+    if status == 0 and (task.folder / "result.json").exists():
         return None
-    return f"crashed: {_ending(status)}; last words: {_last_line(folder / 'log.txt')}"
+    return f"crashed: {_ending(status)}; last words: {_last_line(log_path)}"
+
+
+def _write_job(task: RunTask) -> None:
+    """What the runner reads, and a link to the map that it loads: the tracker takes bare names only."""
+    job = {
+        "vocabulary": str(task.vocabulary.absolute()),
+        "settings": "settings.yaml",
+        "width": task.drive.camera.width,
+        "height": task.drive.camera.height,
+        "paced": task.paced,
+        "localize": task.loaded is not None,
+    }
+    write_atomically(task.folder / "job.json", json.dumps(job, indent=1).encode())
+    if task.loaded is not None:
+        link = task.folder / f"{ATLAS}.osa"
+        link.unlink(missing_ok=True)
+        link.symlink_to((task.loaded / f"{ATLAS}.osa").absolute())
 
 
 def _feed(pipe: IO[bytes] | None, drive: StereoDrive) -> None:
@@ -155,7 +174,3 @@ def _ending(status: int) -> str:
 def _last_line(path: Path) -> str:
     lines = path.read_text(errors="replace").splitlines()
     return next((line.strip() for line in reversed(lines) if line.strip()), "none")
-
-
-def _grey(frame: Frame) -> Frame:
-    return np.asarray(cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY), dtype=np.uint8)

@@ -14,12 +14,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hippodrome.core import se2
 from hippodrome.core.types import HippodromeError, Trajectory
-from hippodrome.eval.baselines.orbslam3 import environment, tracker
+from hippodrome.eval.baselines.orbslam3 import environment, pairs, tracker
 from hippodrome.eval.baselines.orbslam3.environment import NotInstalled, ensure_environment
+from hippodrome.eval.baselines.orbslam3.pairs import StereoDrive
 from hippodrome.eval.baselines.orbslam3.poses import body_poses, read_camera_tum, thinned
+from hippodrome.eval.baselines.orbslam3.relocalize import METHOD, map_alignment, score_sequence, sequence_task
 from hippodrome.eval.baselines.orbslam3.rows import FINAL, LIVE, failed_rows, rows
-from hippodrome.eval.baselines.orbslam3.settings import settings_text
-from hippodrome.eval.baselines.orbslam3.tracker import StereoDrive, run_tracker
+from hippodrome.eval.baselines.orbslam3.tracker import RunTask, run_tracker
+from hippodrome.eval.baselines.sequences import SequenceRow
+from hippodrome.eval.trajectory_io import read_tum
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.render.camera import CameraSpec
 
@@ -29,7 +32,8 @@ FRAMES = 40
 STAND_IN = """\
 import json, os, sys, time
 import numpy as np
-size = int(sys.argv[3]) * int(sys.argv[4])
+job = json.load(open(sys.argv[1]))
+size = job["width"] * job["height"]
 times, brightness = [], []
 while len(data := sys.stdin.buffer.read(8 + 2 * size)) == 8 + 2 * size:
     times.append(float(np.frombuffer(data, "<f8", 1)[0]))
@@ -37,7 +41,8 @@ while len(data := sys.stdin.buffer.read(8 + 2 * size)) == 8 + 2 * size:
 {ending}
 way = [1.0 * k for k in range(len(times))]  # straight ahead: +z of the first camera, a metre a frame
 lines = [f"{{t!r}} 0 0 {{w!r}} 0 0 0 1" for t, w in zip(times, way)]
-for name in ("live", "final", "keyframes"):
+open("steps.txt", "w").write("\\n".join(f"{{t!r}} 1 {{int(k >= 30)}} {{0.1 * (k + 1)}}" for k, t in enumerate(times)) + "\\n")
+for name in ("live",) if job["localize"] else ("live", "final", "keyframes"):
     open(f"{{name}}.tum", "w").write("\\n".join(lines) + "\\n")
 open("brightness.json", "w").write(json.dumps(brightness))
 open("result.json", "w").write(json.dumps(dict(frames=len(times), tracked={tracked}, cpu_s=1.0, loading_cpu_s=0.5,
@@ -45,33 +50,35 @@ open("result.json", "w").write(json.dumps(dict(frames=len(times), tracked={track
 """
 
 
-class FakeRecording:
-    """A straight drive eastwards, a metre a frame; frame ``n`` is as bright as its number, the right one is brighter by 100."""
-
-    def __init__(self):
-        steps = np.arange(2 * FRAMES)
-        poses = np.column_stack([0.5 * (steps - 1) + 7.0, np.full(2 * FRAMES, 3.0), np.zeros(2 * FRAMES)])
-        frame = np.where(steps % 2 == 1, steps // 2, -1).astype(np.int32)
-        nothing = np.zeros(2 * FRAMES)
-        lane = np.zeros(2 * FRAMES, dtype=np.int32)
-        self.samples = Samples(0.05 * (steps + 1), nothing, nothing, nothing, frame, poses, nothing, lane, nothing, ("a",))
-
-    def frame(self, number, side=""):
-        return np.full((48, 64, 3), number + (100 if side == "r" else 0), dtype=np.uint8)
-
-    def ground_truth(self):
-        return Trajectory(self.samples.t_s, self.samples.poses_m)
+def straight():
+    """A drive eastwards, a metre a frame, every second step a frame."""
+    steps = np.arange(2 * FRAMES)
+    poses = np.column_stack([0.5 * (steps - 1) + 7.0, np.full(2 * FRAMES, 3.0), np.zeros(2 * FRAMES)])
+    frame = np.where(steps % 2 == 1, steps // 2, -1).astype(np.int32)
+    nothing = np.zeros(2 * FRAMES)
+    lane = np.zeros(2 * FRAMES, dtype=np.int32)
+    return Samples(0.05 * (steps + 1), nothing, nothing, nothing, frame, poses, nothing, lane, nothing, ("a",))
 
 
-DRIVE = StereoDrive(FakeRecording(), CAMERA, FRAMES)
+DRIVE = StereoDrive(Path("nowhere"), straight(), CAMERA, 0, FRAMES)
 
 
-def run(monkeypatch, folder, ending="", tracked="len(times)"):
+@pytest.fixture(autouse=True)
+def frames(monkeypatch):
+    """Frame ``n`` is as bright as its number, the right one is brighter by 100."""
+
+    def read_pair(folder, number):
+        return tuple(np.full((48, 64), number + brighter, dtype=np.uint8) for brighter in (0, 100))
+
+    monkeypatch.setattr(pairs, "read_pair", read_pair)
+
+
+def run(monkeypatch, folder, ending="", tracked="len(times)", **task):
     script = folder / "stand_in.py"
     folder.mkdir(parents=True, exist_ok=True)
     script.write_text(STAND_IN.format(ending=ending, tracked=tracked))
     monkeypatch.setattr(tracker, "RUNNER", script)
-    return run_tracker(Path(sys.executable), folder / "vocabulary.txt", DRIVE, folder / "run")
+    return run_tracker(RunTask(Path(sys.executable), folder / "vocabulary.txt", DRIVE, folder / "run", **task))
 
 
 def test_a_good_run_becomes_two_rows(monkeypatch, tmp_path):
@@ -116,9 +123,44 @@ def test_what_goes_wrong_has_a_name(monkeypatch, tmp_path, ending, tracked, caus
 
 
 def test_a_hang_is_ended(monkeypatch, tmp_path):
-    monkeypatch.setattr(tracker, "LIMIT_BASE_S", 1.0)
-    monkeypatch.setattr(tracker, "LIMIT_PER_FRAME_S", 0.0)
-    assert "hung" in run(monkeypatch, tmp_path, ending="time.sleep(60)").failure
+    assert "hung: no end after 1 s" in run(monkeypatch, tmp_path, ending="time.sleep(60)", limit_s=1.0).failure
+
+
+def test_a_sequence_is_scored_where_the_saved_map_lies(monkeypatch, tmp_path):
+    """The stand-in merges at frame 30; the mapped run's trajectory says where its map is: 7 m east, 3 m north."""
+    mapped = run(monkeypatch, tmp_path / "mapping")
+    found = run(monkeypatch, tmp_path / "sequence", loaded=mapped.folder)
+    assert (tmp_path / "sequence" / "run" / "atlas.osa").is_symlink()
+    assert "LoadAtlasFromFile" in (tmp_path / "sequence" / "run" / "settings.yaml").read_text()
+    row = SequenceRow(method=METHOD, number=3, length_m=39.0)
+    task = RunTask(Path(), Path(), DRIVE, found.folder)
+    located = score_sequence(row, found, task, map_alignment(mapped, DRIVE.truth()), tmp_path)
+    summary = located.row.localization
+    assert summary.success
+    assert summary.initial_frames == 31
+    assert summary.initial_time_ms == pytest.approx(3100.0)
+    assert summary.initial_distance_m == pytest.approx(30.0)
+    assert summary.error_max_m == pytest.approx(0.0, abs=1e-9)
+    poses = read_tum(tmp_path / "sequences" / "ORB-SLAM3-3.tum").poses
+    assert_allclose(poses[0], [37.0, 3.0, 0.0], atol=1e-9)
+
+
+def test_a_sequence_that_failed_or_does_not_fit_says_so(monkeypatch, tmp_path):
+    row = SequenceRow(method=METHOD, number=1, length_m=500.0)
+    lost = run(monkeypatch, tmp_path, tracked="3", loaded=tmp_path)
+    task = RunTask(Path(), Path(), DRIVE, tmp_path)
+    assert "lost" in score_sequence(row, lost, task, None, tmp_path).row.failure
+    with pytest.raises(HippodromeError, match="the sequence 500 m"):
+        sequence_task(row, DRIVE, task)
+
+
+def test_a_sequence_takes_the_frames_of_its_steps(tmp_path):
+    mapped = RunTask(Path("python"), Path("words"), DRIVE, tmp_path / "run-0", paced=True)
+    task = sequence_task(SequenceRow(method=METHOD, number=10, length_m=10.0), DRIVE, mapped)
+    assert (task.drive.first, task.drive.frames) == (29, 10)
+    assert task.loaded == mapped.folder
+    assert task.paced
+    assert task.drive.times_s[0] == pytest.approx(DRIVE.times_s[29])
 
 
 def test_some_failures_leave_a_row_of_the_others(monkeypatch, tmp_path):
@@ -173,7 +215,7 @@ def test_thinning_keeps_a_sample_per_stretch():
 
 
 @pytest.mark.skipif("HIPPODROME_ORBSLAM3" not in os.environ, reason="set HIPPODROME_ORBSLAM3 to the venv of `make baselines`")
-def test_the_real_tracker_starts_and_reports(tmp_path):
+def test_the_real_tracker_starts_and_reports(monkeypatch, tmp_path):
     """Frames without a corner: it loads vocabulary and settings, never initialises, and says that it is lost."""
     from hippodrome.eval.baselines.orbslam3.vocabulary import to_text, train
 
@@ -182,7 +224,6 @@ def test_the_real_tracker_starts_and_reports(tmp_path):
     (tmp_path / "vocabulary.txt").write_text(to_text(train(descriptors, np.arange(2000, dtype=np.int32) // 100, rng, 10, 3)))
     python = Path(os.environ["HIPPODROME_ORBSLAM3"]) / "bin" / "python"
     camera = CameraSpec(width=320, height=240, stereo_baseline_m=0.5)
-    drive = StereoDrive(FakeRecording(), camera, FRAMES)
-    drive.recording.frame = lambda number, side="": np.full((240, 320, 3), 100, dtype=np.uint8)
-    assert settings_text(camera)
-    assert "lost: 0 of 40" in run_tracker(python, tmp_path / "vocabulary.txt", drive, tmp_path / "run").failure
+    drive = StereoDrive(Path("nowhere"), straight(), camera, 0, FRAMES)
+    monkeypatch.setattr(pairs, "read_pair", lambda folder, number: (np.full((240, 320), 100, dtype=np.uint8),) * 2)
+    assert "lost: 0 of 40" in run_tracker(RunTask(python, tmp_path / "vocabulary.txt", drive, tmp_path / "run")).failure

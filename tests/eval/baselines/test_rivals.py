@@ -5,8 +5,8 @@ from numpy.testing import assert_array_equal
 
 from hippodrome.core.mapper import MapperConfig, build_map
 from hippodrome.core.types import Observation
+from hippodrome.eval.baselines.orbslam3.stage import stereo_scenario
 from hippodrome.eval.baselines.rivals import map_without_attractor, run_ratslam, save_ratslam
-from hippodrome.eval.baselines.run import stereo_scenario
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.record import RecordingPlan, prepare
 from hippodrome.sim.scenario import DriveSpec, Scenario

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from hippodrome.eval.baselines import run
+from hippodrome.eval.baselines.orbslam3 import stage
 from hippodrome.eval.baselines.orbslam3.environment import NotInstalled
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
@@ -28,8 +29,9 @@ def scenario(tmp_path, monkeypatch):
         raise NotInstalled("installing pyorbslam3 failed: no wheel for this machine")
 
     monkeypatch.setattr(run, "evaluate", evaluate)
-    monkeypatch.setattr(run, "ensure_environment", ensure_environment)
+    monkeypatch.setattr(stage, "ensure_environment", ensure_environment)
     monkeypatch.setattr(run, "gather", lambda scenario, out: None)
+    monkeypatch.setattr(run, "with_peak_rss", lambda results, scenario, out, workers: results)
     monkeypatch.setattr(run, "table_two", lambda materials: [])
     path = tmp_path / "hamlet.yaml"
     path.write_text(SCENARIO)
@@ -50,6 +52,11 @@ def test_rows_join_the_evaluation_s_and_a_missing_tracker_says_why(scenario, tmp
         "ORB-SLAM3 (live)",
         "ORB-SLAM3 (final)",
     ]
+    sequences = json.loads((out / "hamlet" / "table2.json").read_text())
+    assert len(sequences) == 10
+    assert all("no wheel" in row["failure"] for row in sequences)
+    assert "no wheel" in json.loads((out / "hamlet" / "ratios.json").read_text())["not quoted"]
+    assert "ORB-SLAM3 (live)" in (out / "report.html").read_text()
 
 
 def test_a_quick_look_leaves_the_evaluation_alone(scenario, tmp_path, capsys):
@@ -61,7 +68,7 @@ def test_a_quick_look_leaves_the_evaluation_alone(scenario, tmp_path, capsys):
 
 
 def test_no_frames_is_bad_input(scenario, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(run, "ensure_environment", lambda folder: folder / "bin" / "python")
+    monkeypatch.setattr(stage, "ensure_environment", lambda folder: folder / "bin" / "python")
     status = main(["baselines", str(scenario), "--out", str(tmp_path / "out"), "--workers", "1", "--seconds", "0.01"])
     assert status == BAD_INPUT
     assert "--seconds 0.01" in capsys.readouterr().err

@@ -36,7 +36,7 @@ def test_a_short_drive_is_named():
 
 def test_a_missing_map_gives_rows_that_say_so(monkeypatch, tmp_path):
     monkeypatch.setattr(sequences, "warm_up", lambda: None)
-    rows = table_two(SimpleNamespace(folder=tmp_path), (100.0, 200.0))
+    rows = [one.row for one in table_two(SimpleNamespace(folder=tmp_path), (100.0, 200.0))]
     assert len(rows) == 4
     assert all("no map" in row.failure for row in rows)
     assert table_two_markdown(rows).count("FAILED") == 8  # in the table and beneath it
@@ -46,9 +46,11 @@ def test_figures_reach_both_files(tmp_path):
     found = LocalizationSummary(
         definition="d", success=True, initial_time_ms=1.25, initial_distance_m=9.5, error_mean_m=0.44, false_fixes=0
     )
-    write_table_two(tmp_path, [SequenceRow(method="topometric", number=3, length_m=170.0, first_step=7, localization=found)])
+    write_table_two(
+        tmp_path, "town", [SequenceRow(method="topometric", number=3, length_m=170.0, first_step=7, localization=found)]
+    )
     assert "| topometric | 3 | 170 | yes | 1.25 | 9.50 | 0.44 | 0 |" in (tmp_path / "table2.md").read_text()
-    (row,) = json.loads((tmp_path / "table2.json").read_text())
+    (row,) = json.loads((tmp_path / "town" / "table2.json").read_text())
     assert row["localization"]["initial_time_ms"] == 1.25
 
 

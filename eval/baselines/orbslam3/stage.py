@@ -1,0 +1,114 @@
+"""ORB-SLAM3's part of ``hippodrome baselines``: stereo pairs, vocabulary, mapping runs, sequences in the median run's map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.eval.baselines.orbslam3.environment import NotInstalled, ensure_environment
+from hippodrome.eval.baselines.orbslam3.pairs import StereoDrive, draw_pairs, missing_chunks, stereo_drive
+from hippodrome.eval.baselines.orbslam3.relocalize import empty_rows, map_alignment, score_sequence, sequence_task
+from hippodrome.eval.baselines.orbslam3.rows import failed_rows, rows
+from hippodrome.eval.baselines.orbslam3.tracker import Run, RunTask, run_tracker
+from hippodrome.eval.baselines.orbslam3.training import VocabularyTask, train_vocabulary
+from hippodrome.eval.baselines.sequences import Located, SequenceRow
+from hippodrome.eval.pool import Workers
+from hippodrome.eval.results import Row
+from hippodrome.sim.record import RecordingPlan, Role, prepare
+from hippodrome.sim.recording import CHUNK_FRAMES
+from hippodrome.sim.scenario import Scenario
+
+# The size and about the baseline of the published car data sets. Without grain most of a street's surface has no corner to track.
+STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5, "grain": True}
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerOptions:
+    """How to run it."""
+
+    runs: int
+    seconds: float | None  # only this much of the drive
+    paced: bool
+    limit_s: float | None  # of a run
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """Its rows of Table I, and what the second drive's sequences need: the run of median error."""
+
+    rows: list[Row]
+    median: Run | None = None
+    task: RunTask | None = None  # of that run
+
+
+def stereo_scenario(scenario: Scenario) -> Scenario:
+    """The same drives seen by a stereo camera at the odometry's rate: the tracker needs frames that overlap.
+
+    Town, tour, traffic and seed stay, and none of them knows the camera: the drive is the same to the last bit.
+    """
+    camera = scenario.camera.model_copy(update={**STEREO, "rate_hz": scenario.odometry_rate_hz})
+    return scenario.model_copy(update={"camera": camera})
+
+
+def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers) -> Tracked:
+    """Table I's rows: runs of the tracker on the mapping drive, several at once as the pool has room."""
+    try:
+        python = ensure_environment(out / "venv")
+    except NotInstalled as error:
+        return Tracked(failed_rows(f"not run: {error}"))
+    drive = _pairs(scenario, "mapping", out, options.seconds, pool)
+    task = VocabularyTask(stereo_scenario(scenario).camera, scenario.seed, out)
+    vocabulary = pool.run("words", train_vocabulary, [task])[0]
+    key = drive.folder.name.rpartition("-")[2]  # another recording, another run: nothing stale is read back
+    how = f"{key}-{drive.frames}-frames{'-paced' if options.paced else ''}"
+    folders = [out / scenario.name / "orb-slam3" / how / f"run-{number}" for number in range(options.runs)]
+    tasks = [RunTask(python, vocabulary, drive, folder, options.paced, options.limit_s) for folder in folders]
+    print(f"ORB-SLAM3: {options.runs} runs of {drive.frames:,} stereo pairs", flush=True)
+    runs = pool.run("track", run_tracker, tasks)
+    found = rows(runs, drive)
+    chosen = (found[-1].model_extra or {}).get("median_run")
+    for run, one in zip(runs, tasks, strict=True):
+        if run.folder.name == chosen:
+            return Tracked(found, run, one)
+    return Tracked(found)
+
+
+def locate(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> list[Located]:
+    """Table II's rows: the sequences of the second drive, each in a process that loads the median run's map."""
+    wanted = empty_rows()
+    if tracked.task is None or tracked.median is None:
+        cause = tracked.rows[-1].failure or "no map"
+        return [Located(row.model_copy(update={"failure": cause})) for row in wanted]
+    drive = _pairs(scenario, "localization", out, None, pool)
+    alignment = map_alignment(tracked.median, tracked.task.drive.truth())
+    tasks: list[RunTask | str] = [_sequence(row, drive, tracked.task) for row in wanted]
+    runs = iter(pool.run("locate", run_tracker, [task for task in tasks if isinstance(task, RunTask)]))
+    found = []
+    for row, task in zip(wanted, tasks, strict=True):
+        if isinstance(task, RunTask):
+            found.append(score_sequence(row, next(runs), task, alignment, out / scenario.name))
+        else:
+            found.append(Located(row.model_copy(update={"failure": task})))
+    return found
+
+
+def _sequence(row: SequenceRow, drive: StereoDrive, mapped: RunTask) -> RunTask | str:
+    """The task, or why there is none."""
+    try:
+        return sequence_task(row, drive, mapped)
+    except HippodromeError as error:
+        return str(error)
+
+
+def _pairs(scenario: Scenario, role: Role, out: Path, seconds: float | None, pool: Workers) -> StereoDrive:
+    """The first ``seconds`` of a drive in stereo, all of it if None; only the chunks that are needed are drawn."""
+    plan = RecordingPlan(stereo_scenario(scenario), role, out)
+    pool.run("simulate", prepare, [plan])
+    frames = None if seconds is None else ceil(seconds * plan.scenario.camera.rate_hz)
+    if frames is not None and frames < 2:
+        raise HippodromeError(f"--seconds {seconds:g}: fewer than two frames, give a longer time")
+    drive = stereo_drive(plan, frames)
+    pool.run("pairs", draw_pairs, [(plan, chunk) for chunk in missing_chunks(drive)], weight=lambda _: CHUNK_FRAMES)
+    return drive

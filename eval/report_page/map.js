@@ -47,7 +47,7 @@ function startMap(root) {
     { name: "ground truth", kind: "truth", shown: true },
     ...data.methods.map((path, i) => ({ name: path.name, kind: "vertices", path, colour: COLOURS[i % COLOURS.length],
       shown: path.name === "semi-metric" || i === data.methods.length - 1 })),
-    ...data.drives.map((path) => ({ name: `second drive in ${path.name}`, kind: "drive", path, colour: COLOURS[4], shown: false })),
+    ...data.drives.map((path) => ({ name: `second drive in ${path.name}`, kind: "drive", path, colour: COLOURS[5], shown: false })),
   ];
   const bounds = truthBounds();
   let view = null, fitted = true, size = [0, 0], hovered = null, chosen = null, waiting = false;

@@ -93,18 +93,18 @@ def _extra(scenario: ScenarioResult, name: str) -> dict[str, Any]:
 
 
 def _headline(scenario: ScenarioResult) -> Html:
-    """A method in one tile: its APE, and its localization where it has one."""
-    return element("div", [_tile(row) for row in scenario.rows], class_="tiles")
+    """A method in one tile, what the run is about first: its APE, and its localization where it has one."""
+    return element("div", [_tile(row) for row in reversed(scenario.rows)], class_="tiles")
 
 
 def _tile(row: Row) -> Html:
     if row.ape is None:
         return element("div", element("span", row.method), element("strong", "failed", class_="bad"), class_="figure-tile")
-    details = [f"APE, worst {row.ape.max_m:.1f}\N{NO-BREAK SPACE}m" if row.ape.max_m is not None else "APE"]
+    details = [f"mean APE, worst {row.ape.max_m:.1f}\N{NO-BREAK SPACE}m" if row.ape.max_m is not None else "mean APE"]
     if row.localization is not None and row.localization.error_mean_m is not None:
         details.append(f"localized to {row.localization.error_mean_m:.2f}\N{NO-BREAK SPACE}m")
     return element("div", element("span", row.method), element("strong", f"{row.ape.mean_m:.2f} m"),
-                   element("small", ", ".join(details)), class_="figure-tile")  # fmt: skip
+                   [element("small", line) for line in details], class_="figure-tile")  # fmt: skip
 
 
 def _interactive_map(files: ScenarioFiles) -> Html:
@@ -167,10 +167,15 @@ def _unit_of(name: str) -> tuple[str, str]:
 
 def _commands(scenario: ScenarioResult, evidence: MapEvidence | None) -> Html:
     """The command of each row, to be typed in the folder of the report."""
-    lines = [[method, element("code", command)] for method, command in _command_lines(scenario, evidence)]
+    lines = [[method, element("code", _unbroken(command))] for method, command in _command_lines(scenario, evidence)]
     note = "In the folder that holds this report. Stages take the road network as it is; noise levels that survey it wrongly " \
            "(realistic, harsh) are reproduced by eval only."  # fmt: skip
     return joined(plain_table(["Row", "Command"], lines, "commands"), element("p", note, class_="note"))
+
+
+def _unbroken(command: str) -> list[Html]:
+    """Words that browsers do not break at their hyphens."""
+    return [joined(element("span", word), " ") for word in command.split(" ")]
 
 
 def _command_lines(scenario: ScenarioResult, evidence: MapEvidence | None) -> Iterator[tuple[str, str]]:

@@ -33,12 +33,25 @@ def plain_table(heads: Sequence[str], rows: Sequence[Sequence[Child]], label: st
     return scrolling(element("table", element("thead", head), element("tbody", body)), label)
 
 
+def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Sequence[Child]], label: str) -> Html:
+    """A plain table whose columns stand under a common head where they show the same figure; a lone column has no second head."""
+    top, below = [], []
+    for title, heads in groups:
+        spans = {"colspan": len(heads), "scope": "colgroup"} if heads else {"rowspan": 2, "scope": "col"}
+        top.append(element("th", title, **spans))
+        below += [element("th", head, scope="col") for head in heads]
+    body = [element("tr", element("th", row[0], scope="row"), [element("td", cell) for cell in row[1:]]) for row in rows]
+    head = element("thead", element("tr", top, class_="groups"), element("tr", below))
+    return scrolling(element("table", head, element("tbody", body)), label)
+
+
 def overview(results: Results, quoted: Sequence[Row]) -> Html:
     """One line a scenario: APE of every method, and how the second drive was localized; the paper's figures below."""
     measured = list(dict.fromkeys(row.method for scenario in results.scenarios for row in scenario.rows))
     localizing = [method for method in measured if any(_located(_row(one, method)) for one in results.scenarios)]
-    heads = ["Scenario", *(f"APE (m), {method}" for method in measured)]
-    heads += [*(f"Localization (m), {method}" for method in localizing), "Road (km)", "Drive (s)", "Frames"]
+    groups: list[tuple[str, Sequence[str]]] = [("Scenario", ()), ("Mean APE of the map (m)", measured)]
+    groups += [("Mean localization error (m)", localizing)] if localizing else []
+    groups += [("Road (km)", ()), ("Drive (s)", ()), ("Frames", ())]
     rows: list[Sequence[Child]] = [
         [
             element("a", scenario.name, href=f"#{anchor(place)}"),
@@ -51,7 +64,7 @@ def overview(results: Results, quoted: Sequence[Row]) -> Html:
         for place, scenario in enumerate(results.scenarios)
     ]
     note = element("p", f"The paper's APE: {_paper_line(quoted)} ({QUOTED_NOTE}).", class_="note") if quoted else None
-    return Html(plain_table(heads, rows, "all scenarios") + (note or ""))
+    return Html(grouped_table(groups, rows, "all scenarios") + (note or ""))
 
 
 def anchor(place: int) -> str:

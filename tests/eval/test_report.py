@@ -111,7 +111,7 @@ class Page(HTMLParser):
         return [attributes for name, attributes in self.elements if name == tag]
 
     def text(self):
-        return " ".join(data for parent, data in self.texts if parent not in ("script", "style"))
+        return " ".join(" ".join(data for parent, data in self.texts if parent not in ("script", "style")).split())
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ and a long one does not gather rounding errors.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numba import njit
@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import Float32Array, FloatArray, IntArray, UInt8Array
+
+Roads: TypeAlias = tuple[Any, ...]  # for compiled functions: lane lengths, successor, successor_start, left lane, right lane
 
 _CHORD_M = 1.5  # half the chord that a bin's heading is taken over: SUMO's curves are polylines with joints 1-5 m apart
 _MAX_STACK = 4096  # open branches while walking ahead of one bin; a junction of 6 roads x 3 lanes stays below 100
@@ -48,16 +50,8 @@ def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 
     lane = np.repeat(np.arange(network.lane_count, dtype=np.int32), counts)
     order = np.arange(len(lane)) - lane_start[lane]
     position = (order + 0.5) * (lengths / counts)[lane]
-    tables = _reach_tables(
-        lane,
-        position,
-        lane_start,
-        lengths,
-        network.successor,
-        network.successor_start,
-        (network.left_lane, network.right_lane),
-        float(reach_limit_m),
-    )
+    roads = lengths, network.successor, network.successor_start, network.left_lane, network.right_lane
+    tables = _reach_tables(lane, position, lane_start, roads, float(reach_limit_m))
     return LaneGraph(
         lane=lane,
         position_m=position,
@@ -135,32 +129,29 @@ def _headings_at(network: RoadNetwork, lane: IntArray, position_m: FloatArray, l
 
 
 @njit(cache=True)
+def _push(stack: NDArray[Any], size: int, lane: int, base: float, changes: float) -> int:
+    """The new size of the stack; what no longer fits is left out."""
+    if size == stack.shape[0]:
+        return size
+    stack[size, 0], stack[size, 1], stack[size, 2] = lane, base, changes
+    return size + 1
+
+
+@njit(cache=True)
 def _walk(
-    bin_: int,
-    lane: NDArray[Any],
-    position: NDArray[Any],
-    lane_start: NDArray[Any],
-    lengths: NDArray[Any],
-    successor: NDArray[Any],
-    successor_start: NDArray[Any],
-    sides: tuple[NDArray[Any], NDArray[Any]],
-    limit: float,
-    stack: NDArray[Any],
-    out: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
-) -> int:
+    bin_: int, lane: NDArray[Any], position: NDArray[Any], lane_start: NDArray[Any], roads: Roads, limit: float,
+    stack: NDArray[Any], out: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
+) -> int:  # fmt: skip
     """Fill ``out`` (bin, metres, lane changes) with what lies ahead of ``bin_``, counted; counts only if ``out`` is empty."""
+    lengths, successor, successor_start, left, right = roads
     out_bin, out_m, out_changes = out
-    own = lane[bin_]
     fill = out_bin.shape[0] > 0
-    size = 0
-    count = 0
-    for side in range(3):
-        first = own if side == 0 else sides[side - 1][own]
-        if first < 0:
-            continue
-        base = -position[bin_] if side == 0 else -position[bin_] * lengths[first] / max(lengths[own], 1e-6)
-        stack[size, 0], stack[size, 1], stack[size, 2] = first, base, min(side, 1)
-        size += 1
+    own = lane[bin_]
+    size = count = 0
+    for change, first in enumerate((own, left[own], right[own])):
+        if first >= 0:
+            share = 1.0 if change == 0 else lengths[first] / max(lengths[own], 1e-6)
+            size = _push(stack, size, first, -position[bin_] * share, min(change, 1))
     while size > 0:
         size -= 1
         at, base, changes = int(stack[size, 0]), stack[size, 1], stack[size, 2]
@@ -176,41 +167,26 @@ def _walk(
         end = base + max(lengths[at], 1e-3)
         if end < limit:
             for e in range(successor_start[at], successor_start[at + 1]):
-                if size < stack.shape[0]:
-                    stack[size, 0], stack[size, 1], stack[size, 2] = successor[e], end, changes
-                    size += 1
+                size = _push(stack, size, successor[e], end, changes)
     return count
 
 
 @njit(cache=True)
 def _reach_tables(
-    lane: NDArray[Any],
-    position: NDArray[Any],
-    lane_start: NDArray[Any],
-    lengths: NDArray[Any],
-    successor: NDArray[Any],
-    successor_start: NDArray[Any],
-    sides: tuple[NDArray[Any], NDArray[Any]],
-    limit: float,
+    lane: NDArray[Any], position: NDArray[Any], lane_start: NDArray[Any], roads: Roads, limit: float
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
     bins = lane.shape[0]
     stack = np.empty((_MAX_STACK, 3))
     start = np.zeros(bins + 1, np.int64)
     nothing = np.empty(0, np.int32), np.empty(0, np.float32), np.empty(0, np.uint8)
     for i in range(bins):
-        ahead = _walk(i, lane, position, lane_start, lengths, successor, successor_start, sides, limit, stack, nothing)
-        start[i + 1] = start[i] + ahead
-    bin_ = np.empty(start[-1], np.int32)
-    metres = np.empty(start[-1], np.float32)
-    changes = np.empty(start[-1], np.uint8)
+        start[i + 1] = start[i] + _walk(i, lane, position, lane_start, roads, limit, stack, nothing)
+    bin_, metres, changes = np.empty(start[-1], np.int32), np.empty(start[-1], np.float32), np.empty(start[-1], np.uint8)
     for i in range(bins):
         row = slice(start[i], start[i + 1])
         if start[i + 1] == start[i]:
             continue
-        out = bin_[row], metres[row], changes[row]
-        _walk(i, lane, position, lane_start, lengths, successor, successor_start, sides, limit, stack, out)
+        _walk(i, lane, position, lane_start, roads, limit, stack, (bin_[row], metres[row], changes[row]))
         order = np.argsort(metres[row], kind="mergesort")
-        bin_[row] = bin_[row][order]
-        metres[row] = metres[row][order]
-        changes[row] = changes[row][order]
+        bin_[row], metres[row], changes[row] = bin_[row][order], metres[row][order], changes[row][order]
     return start, bin_, metres, changes

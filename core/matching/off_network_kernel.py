@@ -12,25 +12,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-# What the callers of a compiled function must keep in order; numba takes tuples, not dataclasses.
-Tables: TypeAlias = tuple[Any, ...]  # reach_start, reach_bin, reach_m, reach_changes, bin heading, bin lane, bin points
-Costs: TypeAlias = tuple[float, ...]  # heading sigma, its limit, gain, half a bin, length sigma, scale step and jump, lane change
-OffNetwork: TypeAlias = tuple[Any, ...]  # see ``expand_off``; then leave (nats), per step (nats), spread (nats)
+from hippodrome.core.matching.hypotheses import NOWHERE, Costs, Moment, OffNetwork, OffRows, Rows, Tables, put, wrap
 
+Place: TypeAlias = tuple[float, float, float]
+
+MOST_OFF = 192  # hypotheses off the network in one step; beyond this the worst gives way
+_SAME_PLACE_M = 4.0  # closer than this, two hypotheses off the network count as one
+_SAME_OFFSET_RAD = 0.3
 _KNOWN_LANES = 30  # good hypotheses on more lanes than this: the route is not known, so nothing can be said to leave the network
 
 
-@njit(cache=True, inline="always")
-def wrap(angle: float) -> float:
-    """An angle into [-pi, pi]; the callers' sums lie within a few turns, where this is far quicker than a modulo."""
-    while angle > math.pi:
-        angle -= 2.0 * math.pi
-    while angle < -math.pi:
-        angle += 2.0 * math.pi
-    return angle
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def expand_off(
     x: float,
     y: float,
@@ -73,30 +65,85 @@ def expand_off(
     return count
 
 
-@njit(cache=True)
-def leavers(
-    begin: int, end: int, bin_: NDArray[Any], score: NDArray[Any], spread: float, lane: NDArray[Any], slot: NDArray[Any]
-) -> NDArray[Any]:
-    """The best survivor on each lane, among those within ``spread`` of the best; none if these are on too many lanes."""
-    best = -math.inf
-    for i in range(begin, end):
-        best = max(best, score[i])
-    rows, count = np.empty(_KNOWN_LANES, np.int64), 0
-    known = True
-    for i in range(begin, end):
-        if bin_[i] < 0 or score[i] < best - spread:
+@njit(cache=True, error_model="numpy")
+def move_off(row: Any, off_rows: OffRows, moment: Moment, scales: NDArray[Any], points: NDArray[Any]) -> Place:
+    """Where dead reckoning takes a hypothesis over one step: x, y, metres driven since it left the network."""
+    _, course, step, _, _, _ = moment
+    far = step * scales[row.k]
+    x, y = far * math.cos(course + row.offset), far * math.sin(course + row.offset)
+    if row.bin >= 0:
+        return x + points[row.bin, 0], y + points[row.bin, 1], far
+    left = off_rows[-1 - row.bin]
+    return x + left.x, y + left.y, far + left.away
+
+
+@njit(cache=True, error_model="numpy")
+def drive_off(
+    rows: Rows, off_rows: OffRows, span: tuple[int, int, int, int], best: float, beam: float, moment: Moment,
+    scales: NDArray[Any], tables: Tables, off: OffNetwork, lane_slot: NDArray[Any],
+) -> tuple[int, int, float]:  # fmt: skip
+    """Add the hypotheses that are off the network after a step: those that were before it, and those that leave now.
+
+    ``span``: rows before the step (begin, end), rows in all, rows off the network; both arrays have room for ``MOST_OFF`` more.
+    Returns the new counts and the best score.
+    """
+    begin, end, size, off_size = span
+    first, points, lane, leave_cost, step_cost, spread = size, off[0], tables[5], off[11], off[12], off[13]
+    going = leavers(rows[begin:end], spread, lane, lane_slot)
+    for n in range(begin, end + going.shape[0]):
+        i = n if n < end else begin + going[n - end]
+        row = rows[i]
+        if n < end and row.bin >= 0:
             continue
-        at = slot[lane[bin_[i]]]
+        total = row.score - step_cost - (0.0 if row.bin < 0 else leave_cost)
+        if total < best - beam:
+            continue
+        best = max(best, total)
+        x, y, away = move_off(row, off_rows, moment, scales, points)
+        at, worst = -1, first
+        for other in range(first, size):
+            there = off_rows[-1 - rows[other].bin]
+            if (
+                abs(there.x - x) + abs(there.y - y) < _SAME_PLACE_M
+                and abs(wrap(rows[other].offset - row.offset)) < _SAME_OFFSET_RAD
+            ):
+                at = other
+            worst = other if rows[other].score < rows[worst].score else worst
+        if at < 0 and size - first == MOST_OFF:
+            at = worst
+        if at < 0:
+            at, size, off_size = size, size + 1, off_size + 1
+            rows[at].bin = -off_size
+        elif total <= rows[at].score:
+            continue
+        j = -1 - rows[at].bin
+        off_rows[j].x, off_rows[j].y, off_rows[j].away = x, y, away
+        put(rows, at, -1 - j, row.k, i, total, row.offset, 0.0)
+    return size, off_size, best
+
+
+@njit(cache=True, error_model="numpy")
+def leavers(rows: Rows, spread: float, lane: NDArray[Any], slot: NDArray[Any]) -> NDArray[Any]:
+    """The best row on each lane, among those within ``spread`` of the best; none if these are on too many lanes."""
+    best = NOWHERE
+    for i in range(rows.shape[0]):
+        best = max(best, rows[i].score)
+    found, count = np.empty(_KNOWN_LANES, np.int64), 0
+    known = True
+    for i in range(rows.shape[0]):
+        if rows[i].bin < 0 or rows[i].score < best - spread:
+            continue
+        at = slot[lane[rows[i].bin]]
         if at >= 0:
-            if score[i] > score[rows[at]]:
-                rows[at] = i
+            if rows[i].score > rows[found[at]].score:
+                found[at] = i
         elif count == _KNOWN_LANES:
             known = False
             break
         else:
-            slot[lane[bin_[i]]] = count
-            rows[count] = i
+            slot[lane[rows[i].bin]] = count
+            found[count] = i
             count += 1
     for c in range(count):
-        slot[lane[bin_[rows[c]]]] = -1
-    return rows[:count] if known else rows[:0]
+        slot[lane[rows[found[c]].bin]] = -1
+    return found[:count] if known else found[:0]

@@ -7,14 +7,14 @@ there, 1 m bins are searched over the whole drive.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hippodrome.core.matching import route_kernel
 from hippodrome.core.matching.route_start import anchors, prior_starts, starts_from
 from hippodrome.core.matching.search_config import RouteSearchConfig
 from hippodrome.core.matching.search_field import SearchField, Seeds, kernel_arguments, search_field
+from hippodrome.core.matching.search_passes import best_through
 from hippodrome.core.matching.track import Track
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import Float32Array, FloatArray, HippodromeError, IntArray, StartPose, Visits
@@ -24,11 +24,11 @@ _STRETCH = 24  # steps (120 m): single corners must not decide
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RouteAlternatives:
-    """All surviving hypotheses: sample ``t`` of the track owns rows ``row_start[t]:row_start[t + 1]``."""
+    """Other places at each moment: sample ``t`` of the track owns rows ``row_start[t]:row_start[t + 1]``."""
 
-    row_start: np.ndarray[tuple[int], np.dtype[np.int64]]  # (T + 1,)
-    points_m: FloatArray  # (rows, 2)
-    through_nats: Float32Array  # (rows,) score of the best complete route through this hypothesis
+    row_start: NDArray[np.int64]  # (T + 1,)
+    points_m: Float32Array  # (rows, 2)
+    through_nats: Float32Array  # (rows,) score of the best complete route through this place, less that of the best of all
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,37 +71,23 @@ def search_route(visits: Visits, network: RoadNetwork, config: RouteSearchConfig
 
 def best_route(field: SearchField, seeds: Seeds, config: RouteSearchConfig, places: FloatArray | None = None) -> Route:
     """The most likely route from given starts; ``places`` (T, 3): x, y, 1/sigma^2 of what is known of the way."""
-    arguments = kernel_arguments(field, field.track.heading_rad, places)
-    survivors = route_kernel.forward(*arguments, config.beam_nats, config.most_survivors, 0, seeds)
-    if len(survivors[0]) - 1 < len(field.track.arc):
+    found = best_through(field, kernel_arguments(field, field.track.heading_rad, places), seeds, config)
+    if found is None:
         length_m = field.track.arc[-1] * np.exp(np.mean(field.log_scale))
         raise HippodromeError(
             f"cognitive map: no route of this network is about {length_m:.0f} m long; is it the one that was driven?"
         )
-    return _as_route(field, survivors, route_kernel.backward(*arguments, config.margin_nats, survivors))
-
-
-def _as_route(field: SearchField, survivors: tuple[Any, ...], through: Float32Array) -> Route:
-    graph, track, log_scale = field.graph, field.track, field.log_scale
-    row_start, bins, k, parent, score, offset, rest, places, _ = survivors
-    row = np.empty(len(track.arc), dtype=np.int64)
-    row[-1] = row_start[-2] + np.argmax(score[row_start[-2] :])
-    for t in range(len(row) - 1, 0, -1):
-        row[t - 1] = parent[row[t]]
-    on_network = bins[row] >= 0
-    at = np.maximum(bins[row], 0)
-    lane = np.where(on_network, graph.lane[at], -1).astype(np.int32)
-    position = np.clip(graph.position_m[at] + rest[row], 0.0, field.network.lane_lengths_m()[graph.lane[at]])
-    points = graph.points_m[np.maximum(bins, 0)].astype(np.float32)
-    points[bins < 0] = places[-1 - bins[bins < 0]]
+    graph, rows = field.graph, found.rows
+    on_network, at = rows["bin"] >= 0, np.maximum(rows["bin"], 0)
+    position = np.clip(graph.position_m[at] + rows["rest"], 0.0, field.network.lane_lengths_m()[graph.lane[at]])
     return Route(
-        track=track,
-        points_m=points[row].astype(np.float64),
-        lane=lane,
+        track=field.track,
+        points_m=found.places_m,
+        lane=np.where(on_network, graph.lane[at], -1).astype(np.int32),
         position_m=np.where(on_network, position, np.nan),
-        log_scale=log_scale[k[row]],
-        heading_offset_rad=offset[row].astype(np.float64),
-        score_nats=np.diff(score[row].astype(np.float64), prepend=0.0),
-        total_nats=float(score[row[-1]]),
-        alternatives=RouteAlternatives(row_start, points, through),
+        log_scale=field.log_scale[rows["k"]],
+        heading_offset_rad=rows["offset"].astype(np.float64),
+        score_nats=np.diff(found.score_nats, prepend=0.0),
+        total_nats=float(found.score_nats[-1]),
+        alternatives=RouteAlternatives(found.row_start, found.points_m, found.through_nats),
     )

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from hippodrome.core.matching.hypotheses import OffRows, Rows
 from hippodrome.core.matching.lane_graph import LaneGraph, bin_cells, build_lane_graph
 from hippodrome.core.matching.search_config import OffNetworkCosts, RouteSearchConfig, SearchCosts
 from hippodrome.core.matching.track import Track, driven, make_track, scale_range
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import FloatArray, Visits
 
-Seeds: TypeAlias = tuple[Any, ...]  # of the kernel: bin, scale bin, score, offset, rest; place, metres off the network
+
+class Seeds(NamedTuple):
+    """Hypotheses that a search begins with."""
+
+    rows: Rows
+    off_rows: OffRows
 
 
 @dataclass(frozen=True, slots=True, eq=False)

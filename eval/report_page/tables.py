@@ -37,7 +37,7 @@ def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Se
     """A plain table whose columns stand under a common head where they show the same figure; a lone column has no second head."""
     top, below = [], []
     for title, heads in groups:
-        spans = {"colspan": len(heads), "scope": "colgroup"} if heads else {"rowspan": 2, "scope": "col"}
+        spans: dict[str, str | int] = {"colspan": len(heads), "scope": "colgroup"} if heads else {"rowspan": 2, "scope": "col"}
         top.append(element("th", title, **spans))
         below += [element("th", head, scope="col") for head in heads]
     body = [element("tr", element("th", row[0], scope="row"), [element("td", cell) for cell in row[1:]]) for row in rows]

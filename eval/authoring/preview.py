@@ -9,6 +9,7 @@ import numpy as np
 
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import FloatArray, Frame, IntArray
+from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.figures.frames import draw_contact_sheet
 from hippodrome.eval.figures.preview import draw_preview
 from hippodrome.sim.episode import Samples, draw_frame
@@ -31,6 +32,7 @@ class Preview:
     town: Town
     drives: dict[Role, Drive]
     samples: dict[Role, Samples]
+    town_notes: tuple[str, ...]  # what is odd about the network, where, and what to do
     mapped_share: float  # of the localization drive's length: on directed edges that the mapping drive sees
 
     def lines(self) -> list[str]:
@@ -45,7 +47,7 @@ class Preview:
     def notes(self) -> list[str]:
         few = f"{1.0 - self.mapped_share:.0%} of the localization drive is on roads that the map will not have; " \
               "lengthen mapping.tour or shorten localization.tour"  # fmt: skip
-        return [*self.town.notes, *([few] if self.mapped_share < LITTLE_OVERLAP else [])]
+        return [*self.town_notes, *([few] if self.mapped_share < LITTLE_OVERLAP else [])]
 
 
 def preview_scenario(scenario: Scenario, out: Path) -> Preview:
@@ -57,7 +59,8 @@ def preview_scenario(scenario: Scenario, out: Path) -> Preview:
     drives = {role: drive for role, (drive, _) in simulated.items()}
     samples = {role: sampled for role, (_, sampled) in simulated.items()}
     mapping, second = drives["mapping"], drives["localization"]
-    preview = Preview(town, drives, samples, mapped_share(town.network, mapping, second))
+    notes = network_notes(scenario, town)
+    preview = Preview(town, drives, samples, notes, mapped_share(town.network, mapping, second))
     draw_preview(out / "overview.png", town.network, mapping.poses_m, visits_of_road(town.network, mapping.lane),
                  second.poses_m, f"{scenario.name}: the two drives")  # fmt: skip
     frames, captions = _stills(plans, town, preview)

@@ -13,6 +13,7 @@ from hippodrome.eval.baselines.sequences import SequenceRow
 from hippodrome.eval.results import Row
 
 OURS: Final = ("topometric (paper)", "topometric")
+RATIOS: Final = "ratios.json"
 KNOWN_APE_M: Final = 1.0  # final trajectory, rigid fit; on 600 m of the same kind of town it is 0.15 to 0.35
 LEAST_TRACKED: Final = 0.95
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from hippodrome.eval.baselines.comparison import draw_comparison, draw_sequences
 from hippodrome.eval.baselines.memory import with_peak_rss
 from hippodrome.eval.baselines.orbslam3.stage import Tracked, TrackerOptions, locate, track
-from hippodrome.eval.baselines.ratios import ratios
+from hippodrome.eval.baselines.ratios import RATIOS, ratios
 from hippodrome.eval.baselines.sequences import Located, table_two, write_table_two
 from hippodrome.eval.materials import gather
 from hippodrome.eval.paper_rows import quoted_rows
@@ -65,7 +65,7 @@ def _complete(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers, wo
     write_atomically(out / "table1.md", table_one_markdown(results, quoted_rows()).encode())
     write_table_two(out, scenario.name, [one.row for one in found])
     compared = ratios(results.scenarios[0].rows, [one.row for one in found])
-    write_atomically(out / scenario.name / "ratios.json", to_json(compared).encode())
+    write_atomically(out / scenario.name / RATIOS, to_json(compared).encode())
     draw_comparison(materials, tracked)
     draw_sequences(materials, found)
     write_report(out)

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import base64
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
+from hippodrome.eval.baselines.ratios import RATIOS
+from hippodrome.eval.baselines.sequences import TABLE_TWO, SequenceRow
 from hippodrome.eval.report_evidence import MAP_JSON, THUMBNAILS, MapEvidence, read_map_evidence
+from hippodrome.eval.results import ResultsError
 
 LOSSLESS_BYTES = 120_000  # beyond, a figure is mostly photographs, which lossless coding does not shrink
 PHOTO_QUALITY = 88
@@ -22,6 +27,7 @@ CAPTIONS: Final = {  # in the order of the page; {} stands for the method
     "errors": "Errors along the drive (Fig. 3 D–F)",
     "violins": "Distribution of errors (Fig. 3 G–I)",
     "-ape": "APE on the map, {} (Fig. 3 C)",
+    "localization-methods": "Localization error of all methods on one sequence (Fig. 4 E)",
     "-localization": "Localization error over the second drive, {}",
     "neurodynamics": "Frames, grid cells and head direction while the estimate settles (Fig. 4)",
     "frames": "The mapping drive as the camera sees it",
@@ -45,6 +51,8 @@ class ScenarioFiles:
     pictures: tuple[Picture, ...]
     evidence: MapEvidence | None
     thumbnails: str | None  # data URI
+    sequences: tuple[SequenceRow, ...] = ()
+    ratios: Mapping[str, Any] = field(default_factory=dict)
 
 
 def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
@@ -58,7 +66,17 @@ def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
         tuple(picture for path in figures if (picture := _picture(path)) is not None),
         read_map_evidence(folder / MAP_JSON) if (folder / MAP_JSON).exists() else None,
         data_uri("image/jpeg", frames.read_bytes()) if frames.exists() else None,
+        tuple(_parsed(folder / TABLE_TWO, list[SequenceRow]) or ()),
+        _parsed(folder / RATIOS, dict[str, Any]) or {},
     )
+
+
+def _parsed(path: Path, kind: Any) -> Any:
+    """A JSON file as this type, None if there is none. Raises ResultsError."""
+    try:
+        return TypeAdapter(kind).validate_json(path.read_bytes()) if path.exists() else None
+    except ValidationError as error:
+        raise ResultsError(f"{path}: not readable: {error.errors()[0]['msg']}; run `hippodrome baselines` again") from None
 
 
 def data_uri(media_type: str, content: bytes) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from hippodrome.eval.report_evidence import MapEvidence
+from hippodrome.eval.report_page import comparison
 from hippodrome.eval.report_page.files import Picture, ScenarioFiles
 from hippodrome.eval.report_page.markup import Child, Html, data_script, element, joined
 from hippodrome.eval.report_page.tables import (
@@ -42,6 +43,9 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         element("h3", "Mapping (Table I)"),
         mapping_table(scenario, quoted),
         _titled("Localization from an unknown start (Table II)", localization_table(scenario, quoted)),
+        _titled("Ten sequences from unknown starts (Table II)", comparison.sequences(files.sequences)),
+        _titled("Cheaper than ORB-SLAM3", comparison.ratios(files.ratios)),
+        _titled("What each method is given", comparison.fairness(scenario)),
         _folded("What each figure means", element("ul", [element("li", line) for line in definitions(rows)])),
         _titled("Map", _interactive_map(files) if files.evidence else None),
         _titled("Worst places", worst_places(files.evidence, files.thumbnails is not None) if files.evidence else None),

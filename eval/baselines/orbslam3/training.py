@@ -35,7 +35,7 @@ class VocabularyTask:
 
     @property
     def path(self) -> Path:
-        size = f"{self.camera.width}x{self.camera.height}-{self.camera.fov_deg:g}deg"
+        size = f"{self.camera.width}x{self.camera.height}-{self.camera.fov_deg:g}deg{'-grain' if self.camera.grain else ''}"
         return self.root / "vocabulary" / f"orb-k{BRANCHING}-L{DEPTH}-{size}.txt"  # the tracker reads text by the suffix
 
 

@@ -14,7 +14,8 @@ from hippodrome.sim.self_motion import NOISE_LEVELS
 BEGIN: Final = "<!-- tables: made from the models by `make docs` -->"
 END: Final = "<!-- end of tables -->"
 UNITS: Final = {
-    "nats_per_rad": "nats/rad", "deg_per_sqrt_s": "deg/√s", "rad_per_sqrt_s": "rad/√s", "per_sqrt_s": "1/√s", "per_sqrt_m": "1/√m", "per_metre": "1/m",
+    "nats_per_rad": "nats/rad",
+    "deg_per_sqrt_s": "deg/√s", "rad_per_sqrt_s": "rad/√s", "per_sqrt_s": "1/√s", "per_sqrt_m": "1/√m", "per_metre": "1/m",
     "mps2": "m/s²", "radps": "rad/s", "degps": "deg/s", "mps": "m/s", "km": "km", "deg": "deg", "rad": "rad", "hz": "Hz",
     "px": "px", "nats": "nats", "s": "s", "m": "m",
 }  # fmt: skip

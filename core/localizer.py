@@ -19,6 +19,7 @@ from hippodrome.core.gyro_noise import GyroNoise
 from hippodrome.core.localizer_attractor import AttractorPose
 from hippodrome.core.localizer_config import Injection, LocalizerConfig
 from hippodrome.core.localizer_kalman import KalmanPose
+from hippodrome.core.localizer_lanes import LanePose
 from hippodrome.core.localizer_motion import Motion
 from hippodrome.core.localizer_paper import PaperPose
 from hippodrome.core.localizer_places import is_same_place
@@ -38,7 +39,7 @@ from hippodrome.core.view_search import Found
 
 __all__ = ["Localizer", "LocalizerConfig", "localize"]
 
-PoseBelief: TypeAlias = AttractorPose | KalmanPose | PaperPose
+PoseBelief: TypeAlias = AttractorPose | KalmanPose | LanePose | PaperPose
 
 
 def localize(
@@ -60,13 +61,13 @@ class Localizer:
             )
         self._config = config
         self._places = localizer_places.places_of(cognitive_map, network, config.lane_sigma_m, config.injection.map_m)
-        self._belief = _unknown(cognitive_map, config)
+        self._belief = _unknown(cognitive_map, network, config)
         self._recogniser = PlaceRecogniser(self._places, config)
         self._view_step = view_step.start()
         self._gyro = GyroNoise()
         self._step_m, self._turned_rad = 0.0, 0.0  # since the last look
         self._fixed = False  # an incumbent has been adopted
-        self._evidence = 0.0  # mode "paper": summed margins so far
+        self._evidence = 0.0  # modes "paper" and "lanes": summed margins so far
         self._support, self._challenge = 0.0, 0.0  # summed margins of the incumbent and the challenger, as far as remembered
         self._sq_map: FloatArray = np.zeros((3, 3))  # error of the map where it was recognised last
         self._mapped = True  # as far as known
@@ -130,7 +131,7 @@ class Localizer:
     def _reactivate(self, injection: Injection) -> None:
         """Agreement strengthens the incumbent, or the challenger until it wins; anything else starts a new challenge."""
         config, belief, gate = self._config, self._belief, self._config.injection.gate
-        if isinstance(belief, PaperPose):
+        if isinstance(belief, PaperPose | LanePose):
             self._belief, self._evidence = belief.inject(injection), self._evidence + self._margin
             self._fixed = self._evidence >= config.fix_evidence
             self._sq_map = self._places.sq_map[self._cell]
@@ -184,20 +185,24 @@ def _sigma_m(covariance: FloatArray) -> float:
     return float(np.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])))
 
 
-def _unknown(cognitive_map: CognitiveMap, config: LocalizerConfig) -> PoseBelief:
+def _unknown(cognitive_map: CognitiveMap, network: RoadNetwork | None, config: LocalizerConfig) -> PoseBelief:
     """Belief before the first observation: anywhere in the map, self-motion scaled as in the mapping drive."""
     log_scale = 0.0 if cognitive_map.log_scale is None else float(np.median(cognitive_map.log_scale))
     centre_m = np.mean(cognitive_map.poses[:, :2], axis=0)
     if config.mode == "paper":
         return PaperPose.uniform(centre_m, log_scale, config)
+    if config.mode == "lanes":
+        if network is None:
+            raise HippodromeError("localizer mode 'lanes' is a filter on the road network's lanes: give the network (--network)")
+        return LanePose.uniform(network, log_scale, config)
     if config.mode == "kalman":
         return KalmanPose.uniform(centre_m, log_scale, config)
     return AttractorPose.uniform(centre_m, log_scale, config)
 
 
 def _activity(belief: PoseBelief) -> dict[str, FloatArray]:
-    """State of the networks; the Kalman filter has none."""
-    if isinstance(belief, KalmanPose):
+    """State of the networks; the yardsticks have none."""
+    if isinstance(belief, KalmanPose | LanePose):
         heading_rad, sq_heading = belief.pose[2], belief.covariance[2, 2]
         none = np.zeros((0, 2, 2))
         return {

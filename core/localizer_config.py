@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeAlias
 
 from hippodrome.core.attractor import AttractorConfig, paper_config
 from hippodrome.core.grid_cells import GRID_INFORMATION
@@ -12,6 +12,8 @@ from hippodrome.core.types import FloatArray
 from hippodrome.core.view_cells import ViewCellConfig
 from hippodrome.core.view_search import SearchConfig
 from hippodrome.core.view_step import ViewStepConfig
+
+Mode: TypeAlias = Literal["default", "paper", "kalman", "lanes"]
 
 
 @dataclass(frozen=True)
@@ -58,11 +60,13 @@ class PaperNetworks:
 
 @dataclass(frozen=True)
 class LocalizerConfig:
-    """Mode "default": attractors with hand-back; "paper": as printed; "kalman": the yardstick, given the same injections."""
+    """Mode "default": attractors with hand-back; "paper": as printed. Yardsticks, given the same injections: "kalman", a Kalman
+    filter, and "lanes", a Bayes filter on the lanes of the network.
+    """
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
-    mode: Literal["default", "paper", "kalman"] = "default"
+    mode: Mode = "default"
     views: ViewCellConfig = field(default_factory=ViewCellConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
     steps: ViewStepConfig = field(default_factory=lambda: ViewStepConfig(interval_s=0.4))  # denser than the map: 15 % less error

@@ -50,7 +50,7 @@ class Places:
 def places_of(cognitive_map: CognitiveMap, network: RoadNetwork | None, lane_sigma_m: float, map_sigma_m: float) -> Places:
     """The places of a topometric map; its poses are drawn to the lane's centre where a single lane fits."""
     cells = len(cognitive_map.view_cells.templates)
-    vertex = _first_vertex(cognitive_map.view_cell, cells)
+    vertex = first_vertex(cognitive_map.view_cell, cells)
     poses, sq_map = cognitive_map.poses[vertex], _map_covariance(cognitive_map, vertex, map_sigma_m)
     if network is not None and lane_sigma_m > 0.0:
         sq_across = across(sq_map, poses[:, 2])
@@ -95,7 +95,7 @@ def cells_here(places: Places, pose_m: FloatArray, sigma_m: float) -> IntArray:
     return same_way
 
 
-def _first_vertex(view_cell: IntArray, cells: int) -> IntArray:
+def first_vertex(view_cell: IntArray, cells: int) -> IntArray:
     """Vertex (C,) at which each cell's template was taken: the first that has the cell."""
     vertex = np.zeros(cells, dtype=np.int32)
     vertex[view_cell[::-1]] = np.arange(len(view_cell) - 1, -1, -1)

@@ -8,47 +8,91 @@ from pathlib import Path
 
 import numpy as np
 
+from hippodrome.core.localizer_config import LocalizerConfig, Mode
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
 from hippodrome.eval.localization_score import FALSE_FIX_M, LocalizationScore, score_localization
 from hippodrome.eval.metrics import path_length_m
+from hippodrome.eval.place_recognition import half_known, looks_of, recognise
 from hippodrome.eval.pool import worker_pool
-from hippodrome.eval.robustness_conditions import CONDITIONS, chosen
-from hippodrome.eval.robustness_report import ConditionResult, SequenceResult, report
+from hippodrome.eval.robustness_cases import Kidnapping, PaperSequence, kidnappings, paper_sequences
+from hippodrome.eval.robustness_conditions import CONDITIONS, SAME, chosen
+from hippodrome.eval.robustness_places import PlaceResult
+from hippodrome.eval.robustness_report import ELSEWHERE, ConditionResult, Findings, SequenceResult, markdown, report
 from hippodrome.eval.run import make_recordings
+from hippodrome.eval.scenario_files import read_scenario
 from hippodrome.eval.stages import localize_recording, map_recording, refine_map
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.record import RecordingPlan, finish
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.render.probe import require_gl
-from hippodrome.sim.scenario import Scenario, load_scenario
+from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.survey import with_survey_error
+from hippodrome.sim.town import TownSpec
 
 SEQUENCE_M = 300.0  # long enough to be localized within 200 m and to be wrong thereafter; the paper's are 170-1,485 m
+FAR_M = 1e6  # where another town lies
+ELSEWHERE_SEED = 1_000  # added to the seed: another town of the same kind
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One condition of one scenario, in a finished map."""
+    """One condition of one scenario, in the finished map of ``mapped``."""
 
     name: str
     scenario: Scenario
+    mapped: Scenario
     out: Path
+    starts: tuple[int, int | None]  # how many unknown starts, and the one that is wanted alone
+    mode: Mode = "default"
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What the command line asks for."""
+
+    scenario: Path
+    conditions: Sequence[str] | None
     sequences: int
+    only: int | None  # number of the only start to run, from 1: a failure seen again
+    modes: Sequence[Mode]
+    workers: int
+    out: Path
 
 
-def robustness(path: Path, names: Sequence[str] | None, sequences: int, workers: int, out: Path) -> None:
-    """Record, map once, localize under each condition; writes ``robustness.json``, ``.md`` and ``.png`` below ``out/<name>``."""
-    conditions = chosen(names)
-    scenario = load_scenario(path)
+def robustness(request: Request) -> None:
+    """Record, map once, localize under each condition; writes ``robustness.json``, ``.md`` and figures below ``out/<name>``."""
+    conditions, out = chosen(request.conditions), request.out
+    scenario = read_scenario(request.scenario)
+    if request.only is not None and request.only > request.sequences:
+        raise HippodromeError(f"--start {request.only}: there are {request.sequences} starts, see --sequences")
     require_gl()
-    tasks = [Task(name, CONDITIONS[name](scenario), out, sequences) for name in conditions]
-    plans = [RecordingPlan(task.scenario, "localization", out) for task in tasks]
-    with worker_pool(workers) as pool:
+    starts = request.sequences, request.only
+    tasks = [Task(name, CONDITIONS[name](scenario), scenario, out, starts) for name in conditions]
+    away = Task(ELSEWHERE, elsewhere(scenario), scenario, out, starts)
+    plans = [RecordingPlan(task.scenario, "localization", out) for task in [*tasks, away]]
+    with worker_pool(request.workers) as pool:
         make_recordings([RecordingPlan(scenario, "mapping", out), *plans], pool)
         pool.run("map", _build_map, [(scenario, out)])
-        results = pool.run("localize", _localize, [(task, scenario) for task in tasks])
-    report(out / scenario.name, scenario.name, results)
+        by_mode = [replace(task, mode=mode) for mode in request.modes for task in tasks]
+        results = pool.run("localize", _localize, [*by_mode, away])
+        if request.only is not None:
+            print(markdown(scenario.name, results))
+            return
+        places = pool.run("places", _recognise, tasks)
+        kidnapped = pool.run("kidnap", _kidnap, tasks)
+        paper = pool.run("lengths", _paper_lengths, tasks[:1])
+    path = map_path(scenario, out)
+    bytes_per_view = path.stat().st_size / len(load_map(path)[0].view_cells.templates)
+    by_condition = dict(zip(conditions, kidnapped, strict=True))
+    report(out / scenario.name, scenario.name, Findings(results, places, by_condition, paper[0], bytes_per_view))
+
+
+def elsewhere(scenario: Scenario) -> Scenario:
+    """A drive in another town: generated with another seed, or the default town if the scenario's is a file."""
+    same = CONDITIONS[SAME](scenario)
+    town = same.town if same.town.network is None else TownSpec()
+    return same.model_copy(update={"name": f"{scenario.name}-elsewhere", "seed": scenario.seed + ELSEWHERE_SEED, "town": town})
 
 
 def map_path(scenario: Scenario, out: Path) -> Path:
@@ -72,17 +116,39 @@ def _roads(scenario: Scenario, out: Path) -> RoadNetwork:
     return with_survey_error(town.network, scenario.self_motion_noise.survey_error_m, rng)
 
 
-def _localize(task: tuple[Task, Scenario]) -> ConditionResult:
-    condition, mapped = task
-    drive = finish(RecordingPlan(condition.scenario, "localization", condition.out))
-    cognitive_map, _ = load_map(map_path(mapped, condition.out))
-    roads = _roads(mapped, condition.out)
-    observations, truth = list(drive.observations()), drive.ground_truth()
+def _opened(task: Task) -> tuple[Recording, list[Observation], CognitiveMap, RoadNetwork, LocalizerConfig]:
+    drive = finish(RecordingPlan(task.scenario, "localization", task.out))
+    cognitive_map, _ = load_map(map_path(task.mapped, task.out))
+    config = replace(task.scenario.localizer, mode=task.mode)
+    return drive, list(drive.observations()), cognitive_map, _roads(task.mapped, task.out), config
+
+
+def _localize(task: Task) -> ConditionResult:
+    drive, observations, cognitive_map, roads, config = _opened(task)
+    truth, (count, only) = drive.ground_truth(), task.starts
+    if task.name == ELSEWHERE:  # no place of this map is right
+        truth = replace(truth, poses=truth.poses + np.array([FAR_M, FAR_M, 0.0]))
+    chosen_cuts = [(number, *ends) for number, ends in enumerate(cuts(drive, count), start=1) if only in (None, number)]
     found = tuple(
-        _sequence(observations[first:end], _part(truth, first, end), cognitive_map, roads, condition.scenario)
-        for first, end in cuts(drive, condition.sequences)
+        sequence_result(number, observations[first:end], _part(truth, first, end), cognitive_map, roads, config)
+        for number, first, end in chosen_cuts
     )
-    return ConditionResult(condition.name, found)
+    return ConditionResult(task.name, found, task.mode)
+
+
+def _recognise(task: Task) -> PlaceResult:
+    drive = finish(RecordingPlan(task.scenario, "localization", task.out))
+    mapping = finish(RecordingPlan(task.mapped, "mapping", task.out))
+    cognitive_map, config = half_known(load_map(map_path(task.mapped, task.out))[0]), task.scenario.localizer
+    return PlaceResult(task.name, recognise(cognitive_map, mapping, looks_of(drive, config), config))
+
+
+def _kidnap(task: Task) -> tuple[Kidnapping, ...]:
+    return kidnappings(*_opened(task), task.starts[0])
+
+
+def _paper_lengths(task: Task) -> tuple[PaperSequence, ...]:
+    return paper_sequences(*_opened(task))
 
 
 def cuts(drive: Recording, sequences: int) -> list[tuple[int, int]]:
@@ -104,12 +170,17 @@ def _part(truth: Trajectory, first: int, end: int) -> Trajectory:
     return Trajectory(truth.t_s[first:end], truth.poses[first:end])
 
 
-def _sequence(
-    observations: list[Observation], truth: Trajectory, cognitive_map: CognitiveMap, roads: RoadNetwork, scenario: Scenario
-) -> SequenceResult:
-    run = localize_recording(observations, cognitive_map, roads, scenario.localizer)
+def sequence_result(
+    number: int, observations: Sequence[Observation], truth: Trajectory, cognitive_map: CognitiveMap, roads: RoadNetwork,
+    config: LocalizerConfig,
+) -> SequenceResult:  # fmt: skip
+    """One unknown start."""
+    run = localize_recording(observations, cognitive_map, roads, config)
     score = score_localization(run.estimates, truth, run.step_s)
+    confidence = np.array([estimate.confidence for estimate in run.estimates])
+    looks = np.append(True, np.diff(confidence) != 0.0)  # a look gives a new margin, a step without keeps the last
     return SequenceResult(
+        number=number,
         start=tuple(float(value) for value in truth.poses[0]),
         localized_after_m=score.initial_distance_m,
         errors_m=_errors_after_fix(score),
@@ -118,6 +189,8 @@ def _sequence(
         steps=len(score.localized) - _first_fix(score),
         declared=int(score.localized.sum()),
         nees=score.mean_nees,
+        step_ms=1e3 * float(run.step_s.mean()),
+        look_ms=1e3 * float(np.median(run.step_s[looks])),
     )
 
 

@@ -9,11 +9,27 @@ from typing import Any, Final
 
 import numpy as np
 
+from hippodrome.core.localizer_config import Mode
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.figures.style import ERROR_MAP, TRUTH, VERMILION, Axes, new_figure, save_figure
 from hippodrome.eval.results import to_json
+from hippodrome.eval.robustness_cases import (
+    Kidnapping,
+    PaperSequence,
+    cases_markdown,
+    kidnapping_summary,
+    paper_record,
+    paper_summary,
+)
+from hippodrome.eval.robustness_conditions import SAME
+from hippodrome.eval.robustness_places import DEFINITION as PLACE_DEFINITION
+from hippodrome.eval.robustness_places import PlaceResult, draw_curves
+from hippodrome.eval.robustness_places import markdown as places_markdown
+from hippodrome.eval.robustness_targets import Target, targets
+from hippodrome.eval.robustness_targets import markdown as targets_markdown
 from hippodrome.proto.atomic import write_atomically
 
+ELSEWHERE: Final = "another town"  # whatever is declared there is false
 WITHIN_M: Final = 200.0  # a start counts as a success if the localizer is right within this distance
 ERROR_RANGE_M: Final = (0.2, 20.0)  # of the heat map's colours: below is the map's own error, above is a false fix
 DEFINITION: Final = (
@@ -31,6 +47,7 @@ HEADINGS: Final = (
 class SequenceResult:
     """One unknown start."""
 
+    number: int  # of the start along the drive, from 1: ``--start`` runs it alone
     start: tuple[float, ...]  # true pose: m, m, rad
     localized_after_m: float | None  # metres driven, None: never
     errors_m: FloatArray  # declared steps from the first fix on
@@ -39,6 +56,8 @@ class SequenceResult:
     steps: int  # from the first fix on; the declared ones have an error
     declared: int  # steps of the whole sequence
     nees: float | None  # mean over the declared steps
+    step_ms: float  # mean over all steps, process CPU time
+    look_ms: float  # median of the steps that look at a frame
 
     @property
     def success(self) -> bool:
@@ -56,46 +75,103 @@ class SequenceResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConditionResult:
-    """All starts under one condition."""
+    """All starts under one condition, by one mode of the localizer."""
 
     name: str
     sequences: tuple[SequenceResult, ...]
+    mode: Mode = "default"
+
+    @property
+    def failures(self) -> list[SequenceResult]:
+        """Sequences with a false fix or, in the mapped town, without a right one in time."""
+        return [one for one in self.sequences if one.false_fixes > 0 or (self.name != ELSEWHERE and not one.success)]
 
     def summary(self) -> dict[str, Any]:
         """The row of the table; figures without a sample are None."""
-        errors_m = np.concatenate([sequence.errors_m for sequence in self.sequences])
-        after_m = [sequence.localized_after_m for sequence in self.sequences if sequence.localized_after_m is not None]
-        steps = sum(sequence.steps for sequence in self.sequences)
-        means_m = [mean for sequence in self.sequences if (mean := sequence.error_mean_m) is not None]
-        nees = [(sequence.nees, sequence.declared) for sequence in self.sequences if sequence.nees is not None]
+        return {"condition": self.name, "mode": self.mode, **pooled(self.sequences)}
+
+
+def pooled(sequences: Sequence[SequenceResult]) -> dict[str, Any]:
+    """Figures over sequences, from their steps; None without a sample."""
+    errors_m = np.concatenate([sequence.errors_m for sequence in sequences])
+    after_m = [sequence.localized_after_m for sequence in sequences if sequence.localized_after_m is not None]
+    steps = sum(sequence.steps for sequence in sequences)
+    means_m = [mean for sequence in sequences if (mean := sequence.error_mean_m) is not None]
+    nees = [(sequence.nees, sequence.declared) for sequence in sequences if sequence.nees is not None]
+    return {
+        "sequences": len(sequences),
+        "success_share": float(np.mean([sequence.success for sequence in sequences])),
+        "error_mean_m": float(errors_m.mean()) if len(errors_m) else None,
+        "error_p95_m": float(np.percentile(errors_m, 95.0)) if len(errors_m) else None,
+        "worst_sequence_mean_m": max(means_m, default=None),
+        "localized_after_median_m": float(np.median(after_m)) if after_m else None,
+        "localized_after_max_m": max(after_m, default=None),
+        "false_sequences": sum(sequence.false_fixes > 0 for sequence in sequences),
+        "localized_share": len(errors_m) / steps if steps else None,
+        "nees": sum(mean * count for mean, count in nees) / sum(count for _, count in nees) if nees else None,
+    }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Findings:
+    """All that one run of the command found."""
+
+    results: Sequence[ConditionResult]  # by mode, then by condition; last, the default in another town
+    places: Sequence[PlaceResult]
+    kidnapped: dict[str, tuple[Kidnapping, ...]]  # by condition
+    paper: tuple[PaperSequence, ...]
+    bytes_per_view: float
+
+    @property
+    def conditions(self) -> list[ConditionResult]:
+        """The default mode's, in the mapped town."""
+        return [result for result in self.results if result.mode == "default" and result.name != ELSEWHERE]
+
+    def summary(self) -> dict[str, Any]:
+        """Every figure as plain data."""
+        kidnappings = [one for found in self.kidnapped.values() for one in found]
         return {
-            "condition": self.name,
-            "sequences": len(self.sequences),
-            "success_share": float(np.mean([sequence.success for sequence in self.sequences])),
-            "error_mean_m": float(errors_m.mean()) if len(errors_m) else None,
-            "error_p95_m": float(np.percentile(errors_m, 95.0)) if len(errors_m) else None,
-            "worst_sequence_mean_m": max(means_m, default=None),
-            "localized_after_median_m": float(np.median(after_m)) if after_m else None,
-            "localized_after_max_m": max(after_m, default=None),
-            "false_sequences": sum(sequence.false_fixes > 0 for sequence in self.sequences),
-            "localized_share": len(errors_m) / steps if steps else None,
-            "nees": sum(mean * count for mean, count in nees) / sum(count for _, count in nees) if nees else None,
+            "conditions": [_record(result) for result in self.results],
+            "places": [result.summary() for result in self.places],
+            "kidnapping": {name: kidnapping_summary(found) for name, found in self.kidnapped.items()},
+            "kidnapping_all": kidnapping_summary(kidnappings),
+            "paper_lengths": {**paper_summary(self.paper), "sequences_run": [paper_record(one) for one in self.paper]},
+            "bytes_per_view": self.bytes_per_view,
+            "timings": {"step_ms": self._median("step_ms"), "look_ms": self._median("look_ms")},
         }
 
+    def targets(self) -> list[Target]:
+        """Against what they must be. A declaration in another town is a false fix too."""
+        data = self.summary()
+        everywhere = [result.summary() for result in self.results if result.mode == "default"]
+        mapped = pooled([one for result in self.conditions for one in result.sequences])
+        measured = {**data["timings"], "bytes_per_view": self.bytes_per_view}
+        return targets(mapped, everywhere, data["places"], data["paper_lengths"], data["kidnapping_all"], measured)
 
-def report(folder: Path, name: str, results: Sequence[ConditionResult]) -> None:
-    """Write the three files and print the table."""
-    data = {"scenario": name, "definition": DEFINITION, "conditions": [_record(result) for result in results]}
+    def _median(self, field: str) -> float:
+        return float(np.median([getattr(one, field) for result in self.conditions for one in result.sequences]))
+
+
+def report(folder: Path, name: str, found: Findings) -> None:
+    """Write the files and print the tables."""
+    data = {"scenario": name, "definition": DEFINITION, "place_definition": PLACE_DEFINITION, **found.summary()}
     write_atomically(folder / "robustness.json", to_json(data, "robustness").encode())
-    text = markdown(name, results)
+    away = [result for result in found.results if result.name == ELSEWHERE]
+    parts = [
+        markdown(name, [*found.conditions, *away]), yardsticks(found.results), places_markdown(found.places),
+        cases_markdown(found.kidnapped, found.paper), targets_markdown(found.targets()), _failures(found.results),
+    ]  # fmt: skip
+    text = "\n".join(parts)
     write_atomically(folder / "robustness.md", text.encode())
-    draw_heat_map(folder / "robustness.png", name, results)
-    print(f"{text}\nwritten: {folder}/robustness.json, .md, .png")
+    draw_heat_map(folder / "robustness.png", name, [*found.conditions, *away])
+    draw_curves(folder / "places.png", name, found.places)
+    print(f"{text}\nwritten: {folder}/robustness.json, .md, .png, places.png")
 
 
 def _record(result: ConditionResult) -> dict[str, Any]:
     starts = [
         {
+            "number": sequence.number,
             "start": list(sequence.start),
             "localized_after_m": sequence.localized_after_m,
             "error_mean_m": sequence.error_mean_m,
@@ -113,18 +189,44 @@ def markdown(name: str, results: Sequence[ConditionResult]) -> str:
     """One row a condition."""
     lines = [f"# Localization under other conditions: {name}", "", f"| {' | '.join(HEADINGS)} |", "|---" * len(HEADINGS) + "|"]
     for result in results:
-        row = result.summary()
-        cells = [
-            result.name,
-            f"{100 * row['success_share']:.0f} %",
-            _figures(row, "error_mean_m", "error_p95_m", "worst_sequence_mean_m"),
-            _figures(row, "localized_after_median_m", "localized_after_max_m"),
-            f"{row['false_sequences']} of {row['sequences']}",
-            _percent(row["localized_share"]),
-            _figures(row, "nees"),
-        ]
+        cells = [result.name, *_cells(result.summary())]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join([*lines, "", DEFINITION, ""])
+
+
+def yardsticks(results: Sequence[ConditionResult]) -> str:
+    """One row a mode: the same condition, and all conditions pooled."""
+    lines = ["## Yardsticks, given the same injections", "", f"| mode | {' | '.join(HEADINGS[1:])} | same: error mean / p95, m |"]
+    lines.append("|---" * (len(HEADINGS) + 1) + "|")
+    for mode in dict.fromkeys(result.mode for result in results):
+        of_mode = [result for result in results if result.mode == mode and result.name != ELSEWHERE]
+        row = pooled([one for result in of_mode for one in result.sequences])
+        same = next((_figures(result.summary(), "error_mean_m", "error_p95_m") for result in of_mode if result.name == SAME), "-")
+        lines.append(f"| {mode} | {' | '.join([*_cells(row), same])} |")
+    return "\n".join([*lines, ""])
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    return [
+        f"{100 * row['success_share']:.0f} %",
+        _figures(row, "error_mean_m", "error_p95_m", "worst_sequence_mean_m"),
+        _figures(row, "localized_after_median_m", "localized_after_max_m"),
+        f"{row['false_sequences']} of {row['sequences']}",
+        _percent(row["localized_share"]),
+        _figures(row, "nees"),
+    ]
+
+
+def _failures(results: Sequence[ConditionResult]) -> str:
+    """What to run again: every failed sequence of the default mode."""
+    failed = [(result, one) for result in results if result.mode == "default" for one in result.failures]
+    lines = [
+        f"- {result.name}, start {one.number}: "
+        + (f"{one.false_fixes} false fixes" if one.false_fixes else f"not localized within {WITHIN_M:g} m")
+        + f"; again: `--conditions {result.name} --start {one.number}`"
+        for result, one in failed
+    ]
+    return "\n".join(["## Failures", "", *(lines or ["none"]), ""])
 
 
 def _figures(row: dict[str, Any], *fields: str) -> str:

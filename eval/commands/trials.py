@@ -8,6 +8,8 @@ from typing import Any
 
 from hippodrome.eval.commands.arguments import DONE, add_out, add_workers, positive, seed
 
+MODES = ("default", "kalman", "lanes", "paper")  # of the localizer, see core.localizer_config.Mode
+
 
 def add_trial_commands(commands: Any) -> None:
     """Adds them to the parser's ``commands``."""
@@ -25,6 +27,10 @@ def add_trial_commands(commands: Any) -> None:
     robust.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="its mapping drive is mapped")
     robust.add_argument("--conditions", nargs="+", metavar="NAME", help="some of the conditions only (default: all)")
     robust.add_argument("--sequences", type=positive, default=8, metavar="N", help="unknown starts per condition (default: 8)")
+    robust.add_argument("--start", type=positive, metavar="N", help="only this start of each condition: a failure, run again")
+    robust.add_argument(
+        "--modes", nargs="+", choices=MODES, default=list(MODES), metavar="MODE", help=f"of {', '.join(MODES)} (default: all)"
+    )
     add_workers(robust)
     add_out(robust, "out/robustness")
     robust.set_defaults(command=_robustness)
@@ -51,9 +57,12 @@ def _stress(options: argparse.Namespace) -> int:
 
 def _robustness(options: argparse.Namespace) -> int:
     """Map once, then localize from several unknown starts under each of many conditions; writes a table and a heat map."""
-    from hippodrome.eval.robustness import robustness
+    from hippodrome.eval.robustness import Request, robustness
 
-    robustness(options.scenario, options.conditions, options.sequences, options.workers, options.out)
+    modes = list(dict.fromkeys(["default", *options.modes]))
+    robustness(
+        Request(options.scenario, options.conditions, options.sequences, options.start, modes, options.workers, options.out)
+    )
     return DONE
 
 

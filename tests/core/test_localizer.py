@@ -17,7 +17,7 @@ from hippodrome.core.localizer_motion import Motion
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import HippodromeError, LocalizationStatus, Observation
 from hippodrome.core.view_search import SearchConfig
-from tests.core.looped_world import Pictures, drive, loop_length, topometric_map
+from tests.core.looped_world import Pictures, drive, loop_length, loop_pose, topometric_map
 
 PICTURES = Pictures(seed=3)
 MAP = topometric_map(PICTURES, np.random.default_rng(3))
@@ -159,6 +159,30 @@ def test_map_error_is_added_where_the_map_states_it():
     vague = replace(MAP, covariance=np.tile(np.diag([4.0, 9.0, 0.01]), (len(MAP.poses), 1, 1)))
     covariances = [run(cognitive_map=one, length_m=60.0)[0][-1].covariance for one in (sure, vague)]
     assert_allclose(covariances[1] - covariances[0], np.diag([3.99, 8.99, 0.0099]), atol=1e-9)
+
+
+def loop_road():
+    """The loop as one lane that leads into itself."""
+    points = np.array([loop_pose(s)[:2] for s in np.linspace(0.0, loop_length(), 400, endpoint=False)])
+    nobody, own = np.full(1, -1, dtype=np.int32), np.zeros(1, dtype=np.int32)
+    return RoadNetwork(
+        lane_ids=("loop_0",), edge_ids=("loop",), lane_edge=own, is_internal=np.zeros(1, dtype=bool), width_m=np.full(1, 3.2),
+        speed_limit_mps=np.full(1, 13.9), points_m=points, point_start=np.array([0, 400], dtype=np.int32), successor=own,
+        successor_start=np.array([0, 1], dtype=np.int32), left_lane=nobody, right_lane=nobody,
+    )  # fmt: skip
+
+
+def test_the_filter_on_lanes_finds_itself_and_stays_on_the_road():
+    observations, truth = drive(PICTURES, np.random.default_rng(11), 137.0, 500.0, metres_per_unit=2.5, kidnap=(300.0, 60.0))
+    estimates = localize(observations, MAP, loop_road(), LocalizerConfig(mode="lanes"))
+    localized = np.array([estimate.localized for estimate in estimates])
+    error_m = np.linalg.norm(np.array([estimate.pose for estimate in estimates])[:, :2] - truth[:, :2], axis=1)
+    assert 0 < np.argmax(localized) * 0.8 < 50.0
+    before = slice(int(np.argmax(localized)), 370)
+    assert error_m[before].mean() < 1.5
+    assert localized[450:].all() and error_m[450:].mean() < 1.5  # carried off after 375 steps, and found again
+    with pytest.raises(HippodromeError, match="give the network"):
+        Localizer(MAP, None, LocalizerConfig(mode="lanes"))
 
 
 def test_paper_mode_follows_the_views_but_not_the_scale():

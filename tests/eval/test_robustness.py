@@ -6,9 +6,22 @@ import numpy as np
 import pytest
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.robustness import SEQUENCE_M, cuts
+from hippodrome.eval.place_recognition import Answers
+from hippodrome.eval.robustness import SEQUENCE_M, cuts, elsewhere
+from hippodrome.eval.robustness_cases import (
+    AFTER_M,
+    BEFORE_M,
+    JUMP_M,
+    Kidnapping,
+    PaperSequence,
+    _jumps,
+    kidnapping_summary,
+    paper_summary,
+)
 from hippodrome.eval.robustness_conditions import CONDITIONS, SAME, chosen
-from hippodrome.eval.robustness_report import ConditionResult, SequenceResult, markdown, report
+from hippodrome.eval.robustness_places import PlaceResult
+from hippodrome.eval.robustness_report import ELSEWHERE, ConditionResult, Findings, SequenceResult, markdown, report
+from hippodrome.eval.robustness_targets import Target
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import DriveSpec, Scenario
@@ -81,9 +94,19 @@ def test_sequences_are_spread_evenly_over_the_drive(tmp_path):
         cuts(straight_drive(tmp_path, SEQUENCE_M - 1), 2)
 
 
-def sequence(after_m=10.0, errors_m=(1.0, 3.0), false_fixes=0, nees=1.0):
+def sequence(after_m=10.0, errors_m=(1.0, 3.0), false_fixes=0, nees=1.0, number=1):
     steps = 0 if after_m is None else len(errors_m) + 1
-    return SequenceResult((0.0, 0.0, 0.0), after_m, np.array(errors_m), false_fixes, 0.0, steps, len(errors_m), nees)
+    return SequenceResult(
+        number, (0.0, 0.0, 0.0), after_m, np.array(errors_m), false_fixes, 0.0, steps, len(errors_m), nees, 0.2, 0.8
+    )
+
+
+def findings(*results):
+    right = np.array([True, True, False])
+    answers = Answers("sequence of views", np.array([3.0, 2.0, 1.0]), right, right, right)
+    paper = PaperSequence(1, 372.7, "the localization drive is 300 m long, the sequence 372.7 m")
+    places = [PlaceResult(results[0].name, (answers,))]
+    return Findings(results, places, {results[0].name: (Kidnapping(30.0, 5.0),)}, (paper,), 834.0)
 
 
 def test_summary_by_hand():
@@ -96,16 +119,68 @@ def test_summary_by_hand():
     assert row["false_sequences"] == 1
     assert row["localized_share"] == pytest.approx(3 / 5)  # pooled over steps
     assert row["nees"] == pytest.approx(2.0)
+    assert len(result.failures) == 2
+    assert ConditionResult(ELSEWHERE, (sequence(None, (), nees=None),)).failures == []
 
 
 def test_a_condition_without_any_fix_is_a_row_all_the_same(tmp_path, capsys):
     results = [ConditionResult("same", (sequence(), sequence())), ConditionResult("night", (sequence(None, (), nees=None),) * 2)]
     assert "| night | 0 % | - / - / - | - / - | 0 of 2 | - |" in markdown("town", results)
-    report(tmp_path, "town", results)
+    report(tmp_path, "town", findings(*results))
     written = json.loads((tmp_path / "robustness.json").read_text())
     assert written["conditions"][1]["error_mean_m"] is None
-    assert (tmp_path / "robustness.png").stat().st_size > 5_000
-    first = (tmp_path / "robustness.png").read_bytes()
-    report(tmp_path, "town", results)
-    assert (tmp_path / "robustness.png").read_bytes() == first
+    files = ("robustness.png", "places.png", "robustness.json", "robustness.md")
+    first = [(tmp_path / name).read_bytes() for name in files]
+    assert all(len(content) > 500 for content in first)
+    report(tmp_path, "town", findings(*results))
+    assert [(tmp_path / name).read_bytes() for name in files] == first
     assert "night" in capsys.readouterr().out
+
+
+def test_failures_say_how_to_run_them_again_and_the_yardsticks_have_rows(tmp_path, capsys):
+    bad = sequence(40.0, (25.0,), false_fixes=1, number=7)
+    report(tmp_path, "town", findings(ConditionResult("same", (sequence(), bad)), ConditionResult("same", (bad,), "kalman")))
+    text = (tmp_path / "robustness.md").read_text()
+    assert "start 7: 1 false fixes; again: `--conditions same --start 7`" in text
+    assert text.count("--start") == 1  # a yardstick's failures are its own
+    assert "| kalman | 100 % | 25.00 / 25.00 / 25.00 |" in text
+    assert "| 1 | 372.7 | - | - | - | - | the localization drive is 300 m long" in text
+    capsys.readouterr()
+
+
+def test_targets_are_reached_held_or_missed():
+    verdicts = [Target("error", value, 1.5, 0.7, True, "m").verdict for value in (0.7, 1.0, 2.0, None)]
+    assert verdicts == ["aim reached", "held", "MISSED", "not measured"]
+    assert [Target("recall", value, 90, 97, False, "%").verdict for value in (98, 91, 80)] == ["aim reached", "held", "MISSED"]
+
+
+def test_a_false_fix_in_another_town_counts():
+    found = findings(ConditionResult("same", (sequence(),)), ConditionResult(ELSEWHERE, (sequence(None, (), false_fixes=1, nees=None),)))
+    false = next(target for target in found.targets() if "false fix" in target.item)
+    assert (false.value, false.verdict) == (50.0, "MISSED")
+    assert [result.name for result in found.conditions] == ["same"]
+
+
+def test_another_town_has_other_streets():
+    away = elsewhere(SCENARIO)
+    assert (away.town, away.seed != SCENARIO.seed, away.name) == (SCENARIO.town, True, "town-elsewhere")
+    assert away.localization.conditions == SCENARIO.mapping.conditions
+
+
+def test_kidnappings_jump_far_and_leave_room_to_recover(tmp_path):
+    drive = straight_drive(tmp_path, 701)
+    way_m = drive.samples.poses_m[:, 0]
+    jumps = _jumps(drive.samples.poses_m, way_m, 5)
+    assert len(jumps) == 5
+    for first, jump, landing, end in jumps:
+        assert jump - first == BEFORE_M
+        assert end - landing == AFTER_M
+        assert abs(landing - jump) > JUMP_M
+    assert _jumps(drive.samples.poses_m[:150], way_m[:150], 5) == []
+
+
+def test_kidnappings_without_recovery_count_as_infinitely_far():
+    row = kidnapping_summary([Kidnapping(20.0, 4.0), Kidnapping(None, 150.0), Kidnapping(40.0, 0.0)])
+    assert (row["recovered"], row["recovered_after_median_m"], row["wrong_until_max_m"]) == (2, 40.0, 150.0)
+    assert kidnapping_summary([Kidnapping(None, 9.0)])["recovered_after_median_m"] is None
+    assert paper_summary([PaperSequence(1, 372.7, "too short")])["error_mean_m"] is None

@@ -36,7 +36,7 @@ class BaselineOptions:
     workers: int
     seconds: float | None  # only this much of the drive, and ORB-SLAM3 only: a quick look
     paced: bool
-    limit_s: float | None = None  # of a run
+    limit_s: float | None  # of a run
 
 
 def run_baselines(options: BaselineOptions) -> None:

@@ -41,6 +41,9 @@ def add_trial_commands(commands: Any) -> None:
     baselines.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="see scenarios/")
     baselines.add_argument("--runs", type=positive, default=3, metavar="N", help="of ORB-SLAM3, which varies (default: 3)")
     baselines.add_argument("--seconds", type=float, metavar="S", help="a quick look: ORB-SLAM3 only, on the first S seconds")
+    baselines.add_argument(
+        "--time-limit", type=positive, metavar="MIN", help="a run of ORB-SLAM3 that takes longer hangs (default: by its frames)"
+    )
     baselines.add_argument("--paced", action="store_true", help="feed frames at the camera's rate, not as fast as they are taken")
     add_workers(baselines)
     add_out(baselines, "out/baselines")
@@ -67,8 +70,10 @@ def _robustness(options: argparse.Namespace) -> int:
 
 
 def _baselines(options: argparse.Namespace) -> int:
-    """Evaluate a scenario, run binocular ORB-SLAM3 on its mapping drive and write Table I with all rows; resumable."""
+    """Evaluate a scenario, run binocular ORB-SLAM3 on both its drives and write Tables I and II with all rows; resumable."""
     from hippodrome.eval.baselines.run import BaselineOptions, run_baselines
 
-    run_baselines(BaselineOptions(options.scenario, options.out, options.runs, options.workers, options.seconds, options.paced))
+    limit_s = None if options.time_limit is None else 60.0 * options.time_limit
+    wanted = options.scenario, options.out, options.runs, options.workers, options.seconds, options.paced, limit_s
+    run_baselines(BaselineOptions(*wanted))
     return DONE

@@ -47,7 +47,7 @@ def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Se
 
 def overview(results: Results, quoted: Sequence[Row]) -> Html:
     """One line a scenario: APE of every method, and how the second drive was localized; the paper's figures below."""
-    measured = list(dict.fromkeys(row.method for scenario in results.scenarios for row in scenario.rows))
+    measured = list(dict.fromkeys(row.method for scenario in results.scenarios for row in scenario.rows))[::-1]  # ours first
     localizing = [method for method in measured if any(_located(_row(one, method)) for one in results.scenarios)]
     groups: list[tuple[str, Sequence[str]]] = [("Scenario", ()), ("Mean APE of the map (m)", measured)]
     groups += [("Mean localization error (m)", localizing)] if localizing else []

@@ -47,6 +47,8 @@ def import_map(source: Path, net_file: Path) -> None:
     """Write ``source`` as the SUMO network ``net_file`` (.net.xml.gz); the same map, the same bytes. Raises HippodromeError."""
     if not source.is_file():
         raise HippodromeError(f"{source}: no such file")
+    if source.stat().st_size > MAX_UNPACKED_BYTES:
+        raise _too_large(source)
     with tempfile.TemporaryDirectory() as folder:
         plain, made = Path(folder) / f"map{'.osm' if source.name.endswith(OSM) else '.xodr'}", Path(folder) / "made.net.xml"
         _unpack(source, plain)
@@ -83,11 +85,13 @@ def _unpack(source: Path, plain: Path) -> None:
             while piece := packed.read(PIECE_BYTES):
                 out.write(piece)
                 if out.tell() > MAX_UNPACKED_BYTES:
-                    raise HippodromeError(
-                        f"{source}: more than {MAX_UNPACKED_BYTES >> 20} MiB unpacked; cut out a smaller area (osmium extract)"
-                    )
+                    raise _too_large(source)
     except (OSError, EOFError, zlib.error) as error:
         raise HippodromeError(f"{source}: cannot be read: {error}") from error
+
+
+def _too_large(source: Path) -> HippodromeError:
+    return HippodromeError(f"{source}: more than {MAX_UNPACKED_BYTES >> 20} MiB; cut out a smaller area (osmium extract)")
 
 
 def _unpack_osm(source: Path, plain: Path) -> None:

@@ -68,7 +68,11 @@ def test_a_bomb_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(importing, "MAX_UNPACKED_BYTES", 1 << 20)
     source = tmp_path / "bomb.osm.gz"
     source.write_bytes(gzip.compress(bytes(3 << 20)))
-    with pytest.raises(HippodromeError, match=r"bomb\.osm\.gz: more than 1 MiB unpacked; cut out a smaller area"):
+    country = tmp_path / "country.osm.pbf"
+    country.write_bytes(bytes(2 << 20))
+    with pytest.raises(HippodromeError, match=r"country\.osm\.pbf: more than 1 MiB"):
+        import_map(country, tmp_path / "out.net.xml.gz")
+    with pytest.raises(HippodromeError, match=r"bomb\.osm\.gz: more than 1 MiB; cut out a smaller area"):
         import_map(source, tmp_path / "out.net.xml.gz")
 
 

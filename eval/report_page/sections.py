@@ -171,9 +171,12 @@ def _unit_of(name: str) -> tuple[str, str]:
 
 def _commands(scenario: ScenarioResult, evidence: MapEvidence | None) -> Html:
     """The command of each row, to be typed in the folder of the report."""
-    lines = [[method, element("code", _unbroken(command))] for method, command in _command_lines(scenario, evidence)]
+    commands = list(_command_lines(scenario, evidence))
+    lines = [[method, element("code", _unbroken(command))] for method, command in commands]
+    others = [row.method for row in scenario.rows if row.method not in dict(commands)]
     note = "In the folder that holds this report. Stages take the road network as it is; noise levels that survey it wrongly " \
            "(realistic, harsh) are reproduced by eval only."  # fmt: skip
+    note += f" {', '.join(others)}: with all rows only." if others else ""
     return joined(plain_table(["Row", "Command"], lines, "commands"), element("p", note, class_="note"))
 
 

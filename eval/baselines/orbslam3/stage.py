@@ -16,8 +16,7 @@ from hippodrome.eval.baselines.orbslam3.training import VocabularyTask, train_vo
 from hippodrome.eval.baselines.sequences import Located, SequenceRow
 from hippodrome.eval.pool import Workers
 from hippodrome.eval.results import Row
-from hippodrome.sim.record import RecordingPlan, Role, prepare
-from hippodrome.sim.recording import CHUNK_FRAMES
+from hippodrome.sim.record import ROLES, RecordingPlan, prepare
 from hippodrome.sim.scenario import Scenario
 
 # The size and about the baseline of the published car data sets. Without grain most of a street's surface has no corner to track.
@@ -58,9 +57,7 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
         python = ensure_environment(out / "venv")
     except NotInstalled as error:
         return Tracked(failed_rows(f"not run: {error}"))
-    drive = _pairs(scenario, "mapping", out, options.seconds, pool)
-    task = VocabularyTask(stereo_scenario(scenario).camera, scenario.seed, out)
-    vocabulary = pool.run("words", train_vocabulary, [task])[0]
+    drive, vocabulary = _prepared(scenario, out, options.seconds, pool)
     key = drive.folder.name.rpartition("-")[2]  # another recording, another run: nothing stale is read back
     how = f"{key}-{drive.frames}-frames{'-paced' if options.paced else ''}"
     folders = [out / scenario.name / "orb-slam3" / how / f"run-{number}" for number in range(options.runs)]
@@ -81,7 +78,7 @@ def locate(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> li
     if tracked.task is None or tracked.median is None:
         cause = tracked.rows[-1].failure or "no map"
         return [Located(row.model_copy(update={"failure": cause})) for row in wanted]
-    drive = _pairs(scenario, "localization", out, None, pool)
+    drive = stereo_drive(RecordingPlan(stereo_scenario(scenario), "localization", out))
     alignment = map_alignment(tracked.median, tracked.task.drive.truth())
     tasks: list[RunTask | str] = [_sequence(row, drive, tracked.task) for row in wanted]
     runs = iter(pool.run("locate", run_tracker, [task for task in tasks if isinstance(task, RunTask)]))
@@ -102,13 +99,24 @@ def _sequence(row: SequenceRow, drive: StereoDrive, mapped: RunTask) -> RunTask 
         return str(error)
 
 
-def _pairs(scenario: Scenario, role: Role, out: Path, seconds: float | None, pool: Workers) -> StereoDrive:
-    """The first ``seconds`` of a drive in stereo, all of it if None; only the chunks that are needed are drawn."""
-    plan = RecordingPlan(stereo_scenario(scenario), role, out)
-    pool.run("simulate", prepare, [plan])
-    frames = None if seconds is None else ceil(seconds * plan.scenario.camera.rate_hz)
+def _prepared(scenario: Scenario, out: Path, seconds: float | None, pool: Workers) -> tuple[StereoDrive, Path]:
+    """The pairs of both drives, or those of the first ``seconds`` of the mapping drive alone, and the vocabulary."""
+    stereo = stereo_scenario(scenario)
+    mapping, *others = [RecordingPlan(stereo, role, out) for role in (ROLES if seconds is None else ("mapping",))]
+    pool.run("simulate", prepare, [mapping, *others])
+    frames = None if seconds is None else ceil(seconds * stereo.camera.rate_hz)
     if frames is not None and frames < 2:
         raise HippodromeError(f"--seconds {seconds:g}: fewer than two frames, give a longer time")
-    drive = stereo_drive(plan, frames)
-    pool.run("pairs", draw_pairs, [(plan, chunk) for chunk in missing_chunks(drive)], weight=lambda _: CHUNK_FRAMES)
-    return drive
+    drive = stereo_drive(mapping, frames)
+    words = VocabularyTask(stereo.camera, scenario.seed, out)
+    tasks: list[VocabularyTask | tuple[RecordingPlan, int]] = [words, *((mapping, chunk) for chunk in missing_chunks(drive))]
+    tasks += [(plan, chunk) for plan in others for chunk in missing_chunks(stereo_drive(plan))]
+    pool.run("pairs", _draw, tasks)  # the vocabulary takes longest and no second process can share it: first
+    return drive, words.path
+
+
+def _draw(task: VocabularyTask | tuple[RecordingPlan, int]) -> None:
+    if isinstance(task, VocabularyTask):
+        train_vocabulary(task)
+    else:
+        draw_pairs(task)

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hippodrome.core.matching.confidence import ConfidenceConfig, breaks, judge
+from hippodrome.core.matching.confidence import ConfidenceConfig, breaks, judge, settled
 from hippodrome.core.matching.lane_choice import beside_others, changing, choose_lanes
 from hippodrome.core.matching.route_line import RouteLine, route_line
 from hippodrome.core.matching.route_search import Route, search_route
@@ -49,7 +49,7 @@ def refine_default(
     """The topometric map, from an unknown start unless one is given."""
     visits, edges = cognitive_map.visits, closure_edges(cognitive_map)
     route = search_route(visits, network, config.search, start)
-    status = visit_status(route, judge(route, config.confidence))
+    status = judge(route, config.confidence, edges, start is not None)[route.track.visit_samples()]
     vouched = (status != MatchStatus.OFF_NETWORK).astype(np.float64)
     log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
     line, arc = _line(route, network)
@@ -59,6 +59,7 @@ def refine_default(
         line, arc = _line(choose_lanes(solution.state.poses, vouched > 0.0, network, config.search), network)
         log_scale, free = solution.state.log_scale, changing(line, network)
         solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
+    status = settled(status, route, solution.state.poses, config.confidence)
     return _refinement(cognitive_map, network, line, solution, status)
 
 
@@ -66,12 +67,6 @@ def _line(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArray]:
     """The route's line, and where each visit lies on it (S,)."""
     line, state_arc = route_line(route, network)
     return line, np.interp(route.track.visit_arc, route.track.arc, state_arc)
-
-
-def visit_status(route: Route, sample_status: UInt8Array) -> UInt8Array:
-    """Status (S,) of the visits: that of the nearest sample of the track."""
-    nearest = np.round(route.track.visit_arc / route.track.step).astype(np.int64)
-    return sample_status[np.clip(nearest, 0, len(sample_status) - 1)]
 
 
 def closure_edges(cognitive_map: CognitiveMap) -> Edges:

@@ -22,6 +22,10 @@ class Track:
     visit_arc: FloatArray  # (S,) where each visit lies on that axis
     step: float
 
+    def visit_samples(self) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+        """The sample (S,) nearest to each visit."""
+        return np.clip(np.round(self.visit_arc / self.step).astype(np.int64), 0, len(self.arc) - 1)
+
 
 def make_track(visits: Visits, step: float) -> Track:
     """Sample the visits' motions every ``step`` map units."""

@@ -1,6 +1,6 @@
 import numpy as np
 
-from hippodrome.core.matching.confidence import ConfidenceConfig, breaks, distant_gap, judge
+from hippodrome.core.matching.confidence import ConfidenceConfig, breaks, distant_gap, judge, settled
 from hippodrome.core.matching.route_search import Route, RouteAlternatives, search_route
 from hippodrome.core.matching.search_config import RouteSearchConfig
 from hippodrome.core.matching.track import Track
@@ -32,8 +32,9 @@ def test_each_status_has_its_reason():
     lane = np.where(np.arange(steps) >= 90, -1, 0).astype(np.int32)
     score = np.where((np.arange(steps) > 50) & (np.arange(steps) < 80), -4.0, -0.1)
     nothing = np.zeros(steps)
+    weaving = np.cumsum(np.where(np.arange(steps) // 10 % 2, 0.3, -0.3))  # turns that roads explain: evidence enough
     route = Route(
-        track=Track(nothing, nothing, nothing, 1.0),
+        track=Track(nothing, weaving, nothing, 1.0),
         points_m=points,
         lane=lane,
         position_m=nothing,
@@ -68,7 +69,7 @@ def test_a_self_similar_grid_is_ambiguous_without_a_prior_and_matched_with_one()
     blind = judge(search_route(visits, network, RouteSearchConfig()), CONFIG)
     assert np.all(blind == MatchStatus.AMBIGUOUS)
     told = search_route(visits, network, RouteSearchConfig(), StartPose(*poses[0]))
-    status = judge(told, CONFIG)
+    status = judge(told, CONFIG, start_known=True)
     assert np.mean(status == MatchStatus.MATCHED) > 0.85  # the last straight shows no scale: it may end 30 m farther
     assert misplaced_m(told, poses).max() < 6.0
 
@@ -83,3 +84,25 @@ def test_what_is_accepted_is_right_on_short_drives_too():
         accepted += matched.any()
         assert misplaced_m(route, poses)[matched].max(initial=0.0) < 15.0
     assert accepted > 0
+
+
+def test_another_town_is_not_matched():
+    """Drives through one town, offered another of the same make: nothing is vouched for, and every vertex has its cause."""
+    for seed in (3, 4):
+        visits, _, _ = random_drive(
+            grid_network(np.random.default_rng(seed), columns=3, rows=3), seed, 800.0, turn_noise_rad=0.004
+        )
+        route = search_route(visits, grid_network(np.random.default_rng(30 + seed), columns=3, rows=3), RouteSearchConfig())
+        status = judge(route, CONFIG)
+        assert not np.any(status == MatchStatus.MATCHED)
+        assert sum(b.last_vertex - b.first_vertex + 1 for b in breaks(status)) == len(status)
+
+
+def test_a_vertex_that_the_refinement_drags_away_is_not_vouched_for():
+    network = grid_network(np.random.default_rng(2), columns=3, rows=3)
+    visits, poses, _ = random_drive(network, 0, 350.0)
+    route = search_route(visits, network, RouteSearchConfig(), StartPose(*poses[0]))
+    status = np.full(len(poses), MatchStatus.MATCHED, dtype=np.uint8)
+    assert np.array_equal(settled(status, route, poses, CONFIG), status)
+    dragged = poses + np.where(np.arange(len(poses)) == 5, 20.0, 0.0)[:, None]
+    assert np.flatnonzero(settled(status, route, dragged, CONFIG)).tolist() == [5]

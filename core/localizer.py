@@ -116,7 +116,8 @@ class Localizer:
         if not self._fixed:
             return
         self._mapped = len(here) > 0 or self._seen == 0.0
-        similarity = found.similarity[np.isin(found.cells, here)]
+        place = np.minimum(np.searchsorted(found.cells, here), len(found.cells) - 1)
+        similarity = found.similarity[place[found.cells[place] == here]]
         if len(similarity) > 0:
             z = float(self._recogniser.z_score(found, float(similarity.max())))
             memory = self._config.seen_memory if self._seen != 0.0 else 0.0

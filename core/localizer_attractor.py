@@ -9,7 +9,7 @@ mean and reliability leave the fused belief of Eqs. (15)-(16) where the whole ev
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -38,6 +38,11 @@ class AttractorPose:
     coupling: FloatArray  # (4, 4) covariances of x, y, heading and log scale with one another; the diagonal is not used
     challenged: bool
     config: LocalizerConfig
+    _incumbent: tuple[FloatArray, FloatArray] = field(init=False, repr=False)  # pose (3,), covariance (4, 4): asked for often
+
+    def __post_init__(self) -> None:
+        pose, reliability = self._belief(INTEGRATOR)
+        object.__setattr__(self, "_incumbent", (pose, self._with_couplings(reliability, self.coupling)))
 
     @classmethod
     def uniform(cls, start_m: FloatArray, log_scale: float, config: LocalizerConfig) -> Self:
@@ -56,16 +61,16 @@ class AttractorPose:
     @property
     def pose(self) -> FloatArray:
         """(3,) the read-out of Eqs. (15)-(16), of the incumbent alone while it is challenged."""
-        return self._belief(INTEGRATOR)[0]
+        return self._incumbent[0].copy()
 
     @property
     def covariance(self) -> FloatArray:
         """(3, 3) of ``pose``."""
-        return self._covariance(INTEGRATOR)[:3, :3]
+        return self._incumbent[1][:3, :3].copy()
 
     def predict(self, motion: Motion) -> Self:
         """Path integration, then inhibition; reliabilities fade by the motion's noise and by what the couplings pass on."""
-        covariance, heading_rad = self._covariance(INTEGRATOR), float(self.pose[2])
+        covariance, heading_rad = self._incumbent[1], float(self._incumbent[0][2])
         grown = predicted_covariance(covariance, heading_rad, self.log_scale, motion, self.config.motion)
         variance = np.diag(covariance)
         least = np.zeros(4) if self.challenged else (LEAST_LEFT - 1.0) * variance
@@ -85,9 +90,9 @@ class AttractorPose:
 
     def sq_distance(self, injection: Injection, challenger: bool = False) -> float:
         """Squared Mahalanobis distance of the injection from the incumbent or the challenger."""
-        population = CALIBRATION if challenger else INTEGRATOR
-        difference = innovation(self._belief(population)[0], injection)
-        covariance = self._covariance(population)[:3, :3] + injection.covariance
+        pose, covariance = self._challenger() if challenger else self._incumbent
+        difference = innovation(pose, injection)
+        covariance = covariance[:3, :3] + injection.covariance
         return float(difference @ np.linalg.solve(covariance, difference))
 
     def inject(self, injection: Injection) -> Self:
@@ -95,7 +100,7 @@ class AttractorPose:
         return self._settle(INTEGRATOR)._inject(injection) if self.challenged else self._inject(injection)
 
     def _inject(self, injection: Injection) -> Self:
-        pose, covariance = self.pose, self._covariance(INTEGRATOR)
+        pose, covariance = self._incumbent
         shift, after = correction(covariance, innovation(pose, injection), injection)
         before = np.diag(covariance)
         left = np.diag(after) / before
@@ -157,10 +162,14 @@ class AttractorPose:
             xy_m, r_position = grid_cells.read_out(self.grid, near)
         return np.array([*xy_m, heading_rad]), np.array([*r_position, r_heading])
 
-    def _covariance(self, population: int) -> FloatArray:
-        """(4, 4) with the couplings; a challenger has learned none yet."""
-        _, reliability = self._belief(population)
-        covariance = self.coupling.copy() if population == INTEGRATOR else np.zeros((4, 4))
-        covariance[[0, 1, 2, 3], [0, 1, 2, 3]] = [*(1.0 / reliability[:2]), min(1.0 / reliability[2], BROADEST_RAD**2), 0.0]
-        covariance[3, 3] = self.sq_sigma_scale
+    def _challenger(self) -> tuple[FloatArray, FloatArray]:
+        """Pose (3,) and covariance (4, 4); it has learned no couplings yet."""
+        pose, reliability = self._belief(CALIBRATION)
+        return pose, self._with_couplings(reliability, np.zeros((4, 4)))
+
+    def _with_couplings(self, reliability: FloatArray, coupling: FloatArray) -> FloatArray:
+        """Covariance (4, 4) of reliabilities (3,), the scale's variance and couplings (4, 4)."""
+        covariance = coupling.copy()
+        heading = min(1.0 / reliability[2], BROADEST_RAD**2)
+        covariance[[0, 1, 2, 3], [0, 1, 2, 3]] = [1.0 / reliability[0], 1.0 / reliability[1], heading, self.sq_sigma_scale]
         return covariance

@@ -9,12 +9,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from hippodrome.core.attractor import wrap
 from hippodrome.core.localizer_config import Injection, MotionNoise
 from hippodrome.core.types import FloatArray
-
-SEEN = np.eye(3, 4)  # an injection sees x, y and heading
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +31,32 @@ def predicted_covariance(
 ) -> FloatArray:
     """Covariance (4, 4) after ``motion`` from a state of that heading and scale."""
     along = displacement_m(heading_rad, log_scale, motion)
-    transition = np.eye(4)
-    transition[0, 2], transition[1, 2] = -along[1], along[0]
-    transition[0, 3], transition[1, 3] = along
-    grown: FloatArray = transition @ covariance @ transition.T
-    grown[:2, :2] += noise.speed**2 / motion.dt_s * np.outer(along, along)
     walk = max(noise.gyro_rad_per_sqrt_s, motion.gyro_rad_per_sqrt_s)
-    grown[2, 2] += walk**2 * motion.dt_s + (noise.gyro_gain * motion.turned_rad) ** 2
-    grown[3, 3] += noise.scale_walk_per_sqrt_m**2 * math.hypot(*along)
+    sq_heading = walk**2 * motion.dt_s + (noise.gyro_gain * motion.turned_rad) ** 2
+    sq_scale = noise.scale_walk_per_sqrt_m**2 * math.hypot(*along)
+    grown: FloatArray = _grown(covariance, along[0], along[1], noise.speed**2 / motion.dt_s, sq_heading, sq_scale)
+    return grown
+
+
+@njit(cache=True)
+def _grown(
+    covariance: FloatArray, east_m: float, north_m: float, sq_speed: float, sq_heading: float, sq_scale: float
+) -> FloatArray:
+    """J P J^T + Q, where J adds heading and scale errors, turned about or drawn along the step, to x and y."""
+    moved = covariance.copy()
+    for k in range(4):
+        moved[0, k] += east_m * covariance[3, k] - north_m * covariance[2, k]
+        moved[1, k] += north_m * covariance[3, k] + east_m * covariance[2, k]
+    grown = moved.copy()
+    for k in range(4):
+        grown[k, 0] += east_m * moved[k, 3] - north_m * moved[k, 2]
+        grown[k, 1] += north_m * moved[k, 3] + east_m * moved[k, 2]
+    grown[0, 0] += sq_speed * east_m * east_m
+    grown[0, 1] += sq_speed * east_m * north_m
+    grown[1, 0] += sq_speed * east_m * north_m
+    grown[1, 1] += sq_speed * north_m * north_m
+    grown[2, 2] += sq_heading
+    grown[3, 3] += sq_scale
     return grown
 
 
@@ -58,6 +75,15 @@ def innovation(pose: FloatArray, injection: Injection) -> FloatArray:
 
 def correction(covariance: FloatArray, difference: FloatArray, injection: Injection) -> tuple[FloatArray, FloatArray]:
     """Shift (4,) and covariance (4, 4) of the state after an injection that differs from it by ``difference`` (3,)."""
-    gain = np.linalg.solve(covariance[:3, :3] + injection.covariance, SEEN @ covariance).T
-    left = np.eye(4) - gain @ SEEN
-    return gain @ difference, left @ covariance @ left.T + gain @ injection.covariance @ gain.T  # Joseph's form stays symmetric
+    shift, after = _corrected(covariance, difference, injection.covariance)
+    return shift, after
+
+
+@njit(cache=True)
+def _corrected(covariance: FloatArray, difference: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Gain P H^T S^-1, then Joseph's form, which stays symmetric; H sees the first three of the state."""
+    seen = np.ascontiguousarray(covariance[:, :3])
+    gain = np.ascontiguousarray(np.linalg.solve(seen[:3] + noise, seen.T).T)
+    left = np.eye(4)
+    left[:, :3] -= gain
+    return gain @ difference, left @ covariance @ left.T + gain @ noise @ gain.T

@@ -145,7 +145,23 @@ def expected(places: Places, filtered: Float32Array, hypotheses: int) -> IntArra
     likely = np.flatnonzero(filtered > 0.0)
     if len(likely) > hypotheses:
         likely = likely[np.argpartition(-filtered[likely], hypotheses)[:hypotheses]]
-    return np.concatenate([np.zeros(0, dtype=np.int32), *(places.onward[slice(*places.onward_start[i : i + 2])] for i in likely)])
+    onward: IntArray = _onward_of(likely.astype(np.int32), places.onward_start, places.onward)
+    return onward
+
+
+@njit(cache=True)
+def _onward_of(cells: IntArray, start: IntArray, onward: IntArray) -> IntArray:
+    """The rows of ``cells`` in CSR form, one after the other."""
+    total = 0
+    for i in cells:
+        total += start[i + 1] - start[i]
+    gathered = np.empty(total, dtype=np.int32)
+    end = 0
+    for i in cells:
+        for k in range(start[i], start[i + 1]):
+            gathered[end] = onward[k]
+            end += 1
+    return gathered
 
 
 @njit(cache=True)

@@ -8,6 +8,7 @@ late but never loses one.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, ClassVar
 
 import numpy as np
@@ -82,7 +83,7 @@ def search(
 ) -> Found:
     """Score the query, a descriptor and the running mean, against ``expected`` cells and all that its sketch resembles."""
     if index is None:
-        everything: Float32Array = view_cells.score(bank, *query, views).max(axis=1)
+        everything = _best_shift(view_cells.score(bank, *query, views))
         cells = np.arange(len(everything), dtype=np.int32)
         return Found(cells, everything, float(everything.mean()), float(everything.std()))
     wanted, sampled = np.zeros((2, len(bank.templates)), dtype=np.bool_)
@@ -91,7 +92,7 @@ def search(
     sampled[index.sample] = True
     scored = np.flatnonzero(wanted | sampled).astype(np.int32)
     part = ViewCellBank(bank.kind, bank.shape, bank.templates[scored], bank.mean, bank.inverse_norm[scored])
-    similarity: Float32Array = view_cells.score(part, *query, views).max(axis=1)
+    similarity = _best_shift(view_cells.score(part, *query, views))
     sample, asked = similarity[sampled[scored]], wanted[scored]
     return Found(scored[asked], similarity[asked], float(sample.mean()), float(sample.std()))
 
@@ -106,6 +107,12 @@ def candidates(
     whole = np.rint(projected * (view_cells.QUERY_SCALE / max(float(np.abs(projected).max()), 1e-6))).astype(np.int16)
     likeness = _sketch_likeness(index.sketch, whole)
     return np.argpartition(-likeness, count)[:count].astype(np.int32)
+
+
+def _best_shift(scores: Float32Array) -> Float32Array:
+    """The largest (C,) over the shifts of (C, S): column by column, many times faster than row by row."""
+    best: Float32Array = reduce(np.maximum, scores.T)
+    return best
 
 
 def _unit_rows(bank: ViewCellBank, cells: NDArray[Any]) -> Float32Array:

@@ -9,9 +9,11 @@ from collections.abc import Callable, Sequence
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.commands.arguments import BAD_INPUT, INTERRUPTED
 from hippodrome.eval.commands.authoring import add_scenario_command
+from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands
 from hippodrome.eval.commands.runs import add_run_commands
 from hippodrome.eval.commands.stages import add_stage_commands
+from hippodrome.eval.commands.sweep import add_sweep_command
 from hippodrome.eval.commands.trials import add_trial_commands
 
 EPILOG = """\
@@ -55,6 +57,8 @@ def _parser() -> argparse.ArgumentParser:
     add_gate_commands(commands)
     add_stage_commands(commands)
     add_trial_commands(commands)
+    add_sweep_command(commands)
+    add_exchange_commands(commands)
     return parser
 
 

@@ -61,7 +61,23 @@ class Workers:
 
 @contextmanager
 def worker_pool(workers: int) -> Iterator[Workers]:
+    """``workers`` processes with a progress display."""
+    with process_pool(workers) as executor, progress_bar() as progress:
+        yield Workers(executor, progress)
+
+
+@contextmanager
+def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """``workers`` fresh processes: SUMO and GL keep state that must not be inherited, so they are spawned, not forked."""
+    executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker)
+    try:
+        yield executor
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)
+
+
+def progress_bar() -> Progress:
+    """A display for a terminal; nothing where there is none."""
     columns = (
         TextColumn("{task.description:<10}"),
         BarColumn(bar_width=40),
@@ -71,12 +87,7 @@ def worker_pool(workers: int) -> Iterator[Workers]:
         TimeRemainingColumn(),
     )
     console = Console(stderr=True)
-    executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker)
-    try:
-        with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-            yield Workers(executor, progress)
-    finally:
-        executor.shutdown(wait=True, cancel_futures=True)
+    return Progress(*columns, console=console, disable=not console.is_terminal)
 
 
 def _quiet_worker() -> None:

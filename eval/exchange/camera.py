@@ -1,0 +1,72 @@
+"""The camera of a recording: its PNG files as they are, its intrinsics, and its pose in the optical convention."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hippodrome.core.types import FloatArray
+from hippodrome.sim.recording import CHUNK_FRAMES, Recording, RecordingError, chunk_path, frame_name
+from hippodrome.sim.render.camera import CameraSpec
+
+# Columns: the optical axes (x right, y down, z forward) in body axes (x forward, y left, z up).
+OPTICAL_IN_BODY = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """One frame as it lies on disk."""
+
+    t_s: float
+    number: int
+    left: bytes  # PNG
+    right: bytes | None
+
+
+def camera_of(recording: Recording) -> CameraSpec | None:
+    """The camera's specification; None for an imported drive whose calibration is unknown."""
+    values = recording.manifest.get("camera", {})
+    return CameraSpec.model_validate(values) if "fov_deg" in values else None
+
+
+def intrinsics(camera: CameraSpec) -> FloatArray:
+    """(3, 3) pinhole matrix, pixel centres at whole numbers."""
+    focal_px = camera.focal_px()
+    return np.array([[focal_px, 0.0, camera.width / 2 - 0.5], [0.0, focal_px, camera.height / 2 - 0.5], [0.0, 0.0, 1.0]])
+
+
+def camera_in_body(camera: CameraSpec | None) -> FloatArray:
+    """(4, 4) pose of the left camera, optical axes, in the vehicle's; without calibration it sits at the rear axle."""
+    pose = np.eye(4)
+    pose[:3, :3] = OPTICAL_IN_BODY
+    if camera is not None:
+        yaw = np.radians(camera.yaw_offset_deg)
+        turn = np.array([[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
+        pose[:3, :3] = turn @ OPTICAL_IN_BODY
+        pose[:3, 3] = camera.forward_m, 0.0, camera.height_m
+    return pose
+
+
+def right_in_left(camera: CameraSpec) -> FloatArray:
+    """(4, 4) pose of a stereo pair's right camera in the left one's axes."""
+    pose = np.eye(4)
+    pose[0, 3] = camera.stereo_baseline_m or 0.0
+    return pose
+
+
+def pictures(recording: Recording) -> Iterator[Picture]:
+    """Every frame in order, undecoded: what is exported is bit for bit what was recorded."""
+    t_s = recording.samples.t_s[recording.samples.frame_steps]
+    for first in range(0, len(t_s), CHUNK_FRAMES):
+        path = chunk_path(recording.folder, first // CHUNK_FRAMES)
+        try:
+            with zipfile.ZipFile(path) as archive:
+                names = set(archive.namelist())
+                for number in range(first, min(first + CHUNK_FRAMES, len(t_s))):
+                    right = archive.read(frame_name(number, "r")) if frame_name(number, "r") in names else None
+                    yield Picture(float(t_s[number]), number, archive.read(frame_name(number)), right)
+        except (OSError, KeyError, zipfile.BadZipFile) as error:
+            raise RecordingError(f"{path}: frames cannot be read ({error}); delete the recording to make it anew") from None

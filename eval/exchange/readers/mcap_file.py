@@ -1,0 +1,108 @@
+"""MCAP files with Foxglove's protobuf messages: images, an odometry with velocities, poses."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from google.protobuf.message import DecodeError
+from mcap.exceptions import McapError
+from mcap.reader import McapReader, make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.eval.exchange.foreign import ForeignDrive, ForeignFrame, Motion, motion_table, trajectory_of
+from hippodrome.eval.exchange.poses import Axes
+from hippodrome.eval.exchange.source import ExchangeError
+
+IMAGES = ("foxglove.CompressedImage", "foxglove.RawImage")
+ODOMETRY, POSE = "foxglove.Odometry", "foxglove.PoseInFrame"
+CHANNELS = {"rgb8": None, "bgr8": None, "mono8": cv2.COLOR_GRAY2BGR}  # encodings of RawImage
+TRUTH_TOPICS = ("/ground_truth", "/groundtruth", "/gt_pose")
+
+
+def read_mcap(path: Path, axes: Axes) -> ForeignDrive:
+    """The first topic of images, the first of odometry, and the truth by its customary names."""
+    try:
+        with path.open("rb") as stream:
+            topics = _topics(make_reader(stream), path)
+            images = next((topic for topic, kind in topics.items() if kind in IMAGES), None)
+            if images is None:
+                raise ExchangeError(f"{path}: no topic of {' or '.join(IMAGES)}; it has: {_listed(topics)}")
+            odometry = next((topic for topic, kind in topics.items() if kind == ODOMETRY), None)
+            truth = next((topic for topic in TRUTH_TOPICS if topics.get(topic) in (POSE, ODOMETRY)), None)
+            frames = [_frame(path, images, stamp, message) for stamp, message in _messages(stream, images)]
+            motion = _motion(path, odometry, list(_messages(stream, odometry))) if odometry else None
+            poses = _poses(path, truth, list(_messages(stream, truth)), axes) if truth else None
+    except OSError as error:
+        raise ExchangeError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (McapError, DecodeError, struct.error, ValueError, KeyError, TypeError, MemoryError, EOFError) as error:
+        raise ExchangeError(f"{path}: not a readable MCAP file ({type(error).__name__}: {_one_line(error)})") from None
+    return ForeignDrive(frames, motion, poses, None)
+
+
+def _topics(reader: McapReader, path: Path) -> dict[str, str]:
+    summary = reader.get_summary()
+    if summary is None:
+        raise ExchangeError(f"{path}: no summary in it, so it was cut short; repair it with `mcap recover`")
+    return {
+        channel.topic: summary.schemas[channel.schema_id].name
+        for channel in sorted(summary.channels.values(), key=lambda channel: channel.id)
+        if channel.schema_id in summary.schemas
+    }
+
+
+def _messages(stream: Any, topic: str) -> Iterator[tuple[int, Any]]:
+    stream.seek(0)
+    reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+    for decoded in reader.iter_decoded_messages(topics=[topic]):
+        message = decoded.decoded_message
+        stamp = message.timestamp.seconds * 10**9 + message.timestamp.nanos
+        yield stamp or decoded.message.log_time, message
+
+
+def _frame(path: Path, topic: str, stamp: int, message: Any) -> ForeignFrame:
+    blob = message.data if hasattr(message, "format") else _encoded(message, f"{path}: {topic}")
+    return ForeignFrame(stamp / 1e9, f"{path}: {topic} at {stamp} ns", lambda: bytes(blob))
+
+
+def _encoded(message: Any, where: str) -> bytes:
+    """A raw image as PNG: what comes after needs no second way."""
+    if message.encoding not in CHANNELS:
+        raise ExchangeError(f"{where}: encoding '{message.encoding}', known are {', '.join(CHANNELS)}")
+    channels = 1 if message.encoding == "mono8" else 3
+    if len(message.data) < message.step * message.height or message.step < channels * message.width:
+        raise ExchangeError(f"{where}: an image of {len(message.data)} bytes does not hold {message.width} x {message.height}")
+    rows = np.frombuffer(message.data, np.uint8, message.step * message.height).reshape(message.height, message.step)
+    image = rows[:, : channels * message.width].reshape(message.height, message.width, channels)
+    if message.encoding == "rgb8":
+        image = image[:, :, ::-1]
+    return cv2.imencode(".png", image)[1].tobytes()
+
+
+def _motion(path: Path, topic: str, messages: list[tuple[int, Any]]) -> Motion:
+    t_s, speed = _times(messages), np.array([message.linear_velocity.x for _, message in messages])
+    return motion_table(t_s, speed, np.array([message.angular_velocity.z for _, message in messages]), f"{path}: {topic}")
+
+
+def _poses(path: Path, topic: str, messages: list[tuple[int, Any]], axes: Axes) -> Trajectory:
+    poses = [message.pose for _, message in messages]
+    positions = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in poses])
+    quaternions = np.array([(pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w) for pose in poses])
+    return trajectory_of(_times(messages), positions, quaternions, axes, f"{path}: {topic}")
+
+
+def _times(messages: list[tuple[int, Any]]) -> FloatArray:
+    return np.array([stamp for stamp, _ in messages]) / 1e9
+
+
+def _listed(topics: dict[str, str]) -> str:
+    return ", ".join(f"{topic} ({kind})" for topic, kind in topics.items())[:300] or "none"
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())[:120]

@@ -1,0 +1,135 @@
+"""Layouts made of text tables and image files: TUM RGB-D, KITTI odometry, EuRoC (ASL)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.eval.exchange.foreign import (
+    ForeignDrive,
+    ForeignFrame,
+    Motion,
+    file_frame,
+    increasing,
+    inside,
+    motion_table,
+    read_lines,
+    read_table,
+    trajectory_of,
+)
+from hippodrome.eval.exchange.poses import Axes, planar
+from hippodrome.eval.exchange.source import ExchangeError
+from hippodrome.eval.exchange.tables import ODOMETRY
+
+EUROC_ODOMETRY = Path("odometry0", "data.csv")
+EUROC_TRUTH = Path("state_groundtruth_estimate0", "data.csv")
+
+
+def read_tum_folder(folder: Path, axes: Axes) -> ForeignDrive:
+    """``rgb.txt`` with its images, ``groundtruth.txt`` and ``odometry.csv`` where they exist."""
+    frames = _listed(folder / "rgb.txt", None, 1.0, folder)
+    truth = read_tum_poses(folder / "groundtruth.txt", axes) if (folder / "groundtruth.txt").exists() else None
+    return ForeignDrive(frames, _odometry(folder / ODOMETRY), truth, None)
+
+
+def read_kitti_sequence(folder: Path, axes: Axes) -> ForeignDrive:
+    """``sequences/NN``: ``times.txt``, ``image_2`` or ``image_0``; the truth is ``../../poses/NN.txt``."""
+    t_s = read_table(folder / "times.txt", 1)[:, 0]
+    images = next((folder / name for name in ("image_2", "image_0") if (folder / name).is_dir()), None)
+    if images is None:
+        raise ExchangeError(f"{folder}: no image_2 or image_0 in it; give a folder sequences/NN of the KITTI odometry layout")
+    frames = [file_frame(float(t), images / f"{number:06d}.png") for number, t in enumerate(t_s)]
+    poses, truth = folder.parent.parent / "poses" / f"{folder.name}.txt", None
+    if poses.exists():
+        partly = folder / "truth_times.txt"
+        truth = _kitti_truth(poses, read_table(partly, 1)[:, 0] if partly.exists() else t_s, folder / "origin.txt", axes)
+    return ForeignDrive(frames, _odometry(folder / ODOMETRY), truth, _kitti_focal(folder / "calib.txt"))
+
+
+def read_euroc_folder(folder: Path, axes: Axes) -> ForeignDrive:
+    """``mav0/cam0``, ``mav0/state_groundtruth_estimate0`` and ``mav0/odometry0`` where they exist."""
+    root = folder / "mav0" if (folder / "mav0").is_dir() else folder
+    frames = _listed(root / "cam0" / "data.csv", ",", 1e-9, root / "cam0" / "data")
+    motion, truth = None, None
+    if (root / EUROC_ODOMETRY).exists():
+        table = read_table(root / EUROC_ODOMETRY, 3, ",")
+        motion = motion_table(table[:, 0] / 1e9, table[:, 1], table[:, 2], str(root / EUROC_ODOMETRY))
+    if (root / EUROC_TRUTH).exists():
+        table = read_table(root / EUROC_TRUTH, 8, ",")
+        quaternion = np.roll(table[:, 4:8], -1, axis=1)
+        truth = trajectory_of(table[:, 0] / 1e9, table[:, 1:4], quaternion, axes, str(root / EUROC_TRUTH))
+    return ForeignDrive(frames, motion, truth, _euroc_focal(root / "cam0" / "sensor.yaml"))
+
+
+def read_tum_poses(path: Path, axes: Axes) -> Trajectory:
+    """A TUM trajectory of any axes."""
+    table = read_table(path, 8)
+    return trajectory_of(table[:, 0], table[:, 1:4], table[:, 4:8], axes, str(path))
+
+
+def read_motion(path: Path) -> Motion:
+    """``t_s,speed,yaw_rate`` a line."""
+    table = read_table(path, 3, ",", exactly=True)
+    return motion_table(table[:, 0], table[:, 1], table[:, 2], str(path))
+
+
+def _odometry(path: Path) -> Motion | None:
+    return read_motion(path) if path.exists() else None
+
+
+def _listed(table: Path, separator: str | None, unit_s: float, images: Path) -> list[ForeignFrame]:
+    """Frames of a list of times and file names."""
+    frames = []
+    for number, line in enumerate(read_lines(table), start=1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        words = [word.strip() for word in line.split(separator)]
+        try:
+            # whole nanoseconds divided, as evo and everybody does: a product with 1e-9 would round differently
+            t_s = int(words[0]) / 1e9 if unit_s == 1e-9 else float(words[0]) * unit_s
+            name = words[1]
+        except (ValueError, IndexError):
+            raise ExchangeError(f"{table}: line {number}: not a time and a file name") from None
+        if not np.isfinite(t_s):
+            raise ExchangeError(f"{table}: line {number}: the time is not finite")
+        frames.append(file_frame(t_s, inside(images, name, table)))
+    return frames
+
+
+def _kitti_truth(poses: Path, t_s: FloatArray, origin_file: Path, axes: Axes) -> Trajectory:
+    """Poses of the camera relative to its first; our own exports say where that was."""
+    table = read_table(poses, 12)
+    if len(table) != len(t_s):
+        raise ExchangeError(f"{poses}: {len(table)} poses for {len(t_s)} times")
+    found = np.tile(np.eye(4), (len(table), 1, 1))
+    found[:, :3] = table.reshape(-1, 3, 4)
+    if origin_file.exists():
+        placed = read_table(origin_file, 4)[:4].reshape(4, 4) @ found
+        return increasing(Trajectory(t_s, planar(placed[:, :3, 3], placed[:, :3, :3], "camera")), str(poses))
+    return increasing(Trajectory(t_s, planar(found[:, :3, 3], found[:, :3, :3], axes, world="camera")), str(poses))
+
+
+def _kitti_focal(path: Path) -> float | None:
+    """Of P2, else P0."""
+    if not path.exists():
+        return None
+    rows = {line.split(":", 1)[0]: line.split(":", 1)[1].split() for line in read_lines(path) if ":" in line}
+    words = rows.get("P2") or rows.get("P0")
+    try:
+        return float(words[0]) if words else None
+    except ValueError:
+        raise ExchangeError(f"{path}: P2 does not begin with a number") from None
+
+
+def _euroc_focal(path: Path) -> float | None:
+    if not path.exists():
+        return None
+    try:
+        values: Any = yaml.safe_load("\n".join(line for line in read_lines(path) if not line.startswith("%YAML")))
+        return float(values["intrinsics"][0]) if isinstance(values, dict) and "intrinsics" in values else None
+    except (yaml.YAMLError, ValueError, TypeError, IndexError, RecursionError) as error:
+        raise ExchangeError(f"{path}: not a sensor description ({' '.join(str(error).split())[:80]})") from None

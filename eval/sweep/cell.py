@@ -1,0 +1,148 @@
+"""One cell of a sweep, in whatever process it runs: record what is missing, evaluate, bring back figures and samples."""
+
+from __future__ import annotations
+
+import fcntl
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from hippodrome.core.types import Trajectory
+from hippodrome.eval.association import associate
+from hippodrome.eval.evaluate import MODES, EvaluationTask, evaluate_scenario
+from hippodrome.eval.localization_score import FALSE_FIX_M
+from hippodrome.eval.materials import file_stem, score_trajectory
+from hippodrome.eval.metrics import Score
+from hippodrome.eval.results import Row, ScenarioResult
+from hippodrome.eval.sweep.grid import Cell, SweepError, code_sha256
+from hippodrome.eval.trajectory_io import read_tum
+from hippodrome.sim.record import RecordingPlan, Role, close_renderer, record
+
+ROLES: Final[tuple[Role, ...]] = ("mapping", "localization")
+SHARED: Final = ("recordings", "towns")  # cells that drive alike drive once
+
+_one_at_a_time = threading.Lock()  # SUMO and GL keep one state per process, and a cluster's worker may run several threads
+
+
+class Samples(BaseModel):
+    """The errors behind one figure."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    definition: str
+    errors_m: tuple[float, ...]
+    matched: int
+    total: int
+
+    def score(self) -> Score:
+        """As a score that can be pooled; when each error was made is no longer known."""
+        errors_m = np.array(self.errors_m)
+        return Score(self.definition, errors_m, np.zeros(len(errors_m)), self.matched, self.total)
+
+
+class CellResult(BaseModel):
+    """What a cell came to: the figures of ``hippodrome eval``, and the samples that a merged table is made of."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    parameters: dict[str, str]
+    result: ScenarioResult
+    samples: dict[str, dict[str, Samples]]  # method, then ape, rpe, rpe_20m, localization
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingTask:
+    """The two drives that one or more cells need."""
+
+    plan: RecordingPlan
+    code: str
+
+
+@dataclass(frozen=True, slots=True)
+class CellTask:
+    """A cell, the sweep's folder, and the code that its results are to come from."""
+
+    cell: Cell
+    out: Path
+    code: str
+
+
+def make_recording(task: RecordingTask) -> str:
+    """Record one drive unless it is on disk; its folder."""
+    _require_same_code(task.code)
+    with _one_at_a_time, _locked(task.plan):
+        try:
+            return str(record(task.plan).folder)
+        finally:
+            close_renderer()
+
+
+def run_cell(task: CellTask) -> CellResult:
+    """Evaluate a cell into its folder. On a machine that does not share the sweep's folder, recordings are made there."""
+    _require_same_code(task.code)
+    for role in ROLES:
+        make_recording(RecordingTask(RecordingPlan(task.cell.scenario, role, task.out), task.code))
+    folder = task.out / "cells" / task.cell.key
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in SHARED:
+        if not (folder / name).exists():
+            (folder / name).symlink_to(Path("..", "..", name))
+    with _one_at_a_time:
+        result = evaluate_scenario(EvaluationTask(task.cell.scenario, folder))
+    evidence = folder / task.cell.scenario.name
+    samples = {row.method: found for row in result.rows if (found := _samples(row, evidence))}
+    return CellResult(parameters=dict(task.cell.parameters), result=result, samples=samples)
+
+
+def _require_same_code(code: str) -> None:
+    if code_sha256() != code:
+        raise SweepError(
+            f"a worker runs other code ({code_sha256()}) than this command ({code}); install the same on all machines"
+        )
+
+
+@contextmanager
+def _locked(plan: RecordingPlan) -> Iterator[None]:
+    """One process at a time makes a recording: the second finds it finished. A lock of a process that dies is free."""
+    folder = plan.folder()
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with (folder.parent / f".{folder.name}.lock").open("w") as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)
+        yield
+
+
+def _samples(row: Row, evidence: Path) -> dict[str, Samples]:
+    """Scored again from the trajectories that the evaluation left."""
+    path = evidence / f"{file_stem(row.method)}.tum"
+    if row.ape is None or not path.exists():
+        return {}
+    truth = read_tum(evidence / "ground-truth.tum")
+    scored = score_trajectory(read_tum(path), truth, metric=row.method in dict(MODES))
+    found = {name: _kept(score) for name, score in (("ape", scored.ape), ("rpe", scored.rpe), ("rpe_20m", scored.rpe_20m))}
+    path = evidence / f"{file_stem(row.method)}-localization.tum"
+    if row.localization is not None and path.exists():
+        located = _localization(read_tum(path), read_tum(evidence / "localization-ground-truth.tum"), row.localization.definition)
+        found |= {"localization": located} if located is not None else {}
+    return found
+
+
+def _localization(declared: Trajectory, truth: Trajectory, definition: str) -> Samples | None:
+    """Errors of the declared steps from the first right one on, as ``score_localization`` defines them."""
+    pairs = associate(declared, truth)
+    errors_m = np.hypot(*(pairs.estimate - pairs.reference)[:, :2].T)
+    right = errors_m <= FALSE_FIX_M
+    if not right.any():
+        return None
+    errors_m = errors_m[int(np.argmax(right)) :]
+    return Samples(definition=definition, errors_m=tuple(errors_m.tolist()), matched=len(errors_m), total=pairs.total)
+
+
+def _kept(score: Score) -> Samples:
+    fields: dict[str, Any] = {name: getattr(score, name) for name in ("definition", "matched", "total")}
+    return Samples(errors_m=tuple(score.errors_m.tolist()), **fields)

@@ -1,0 +1,140 @@
+"""Where cells run: processes of this machine, or a Dask cluster. A cell that fails, or kills its process, fails alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError, Executor, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
+
+from rich.progress import Progress
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.eval.pool import process_pool
+from hippodrome.eval.sweep.grid import SweepError
+
+TaskT = TypeVar("TaskT")
+ResultT = TypeVar("ResultT")
+DIED = "its process died, also when it ran alone (out of memory?)"
+CONNECT_S = 10.0  # a scheduler that does not answer in this time is not there
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """Why a task has no result."""
+
+    cause: str
+
+
+@dataclass(frozen=True, slots=True)
+class Runner:
+    """Runs tasks and hears of each as it ends."""
+
+    executors: Callable[[int | None], AbstractContextManager[Executor]]  # how many at once, None: as many as there are
+    progress: Progress
+
+    def run(
+        self,
+        stage: str,
+        task: Callable[[TaskT], ResultT],
+        items: Sequence[TaskT],
+        ended: Callable[[TaskT, ResultT | Failure], None],
+    ) -> None:
+        """``task`` of each item. Items whose process died are tried again alone, so that the one to blame is known."""
+        bar = self.progress.add_task(stage, total=len(items))
+
+        def tell(item: TaskT, result: ResultT | Failure) -> None:
+            ended(item, result)
+            self.progress.advance(bar)
+
+        suspects: list[TaskT] = []
+        waiting = list(items)
+        while waiting:
+            died, waiting = self._pass(task, waiting, None, tell)
+            suspects += died
+        for item in suspects:
+            died, _ = self._pass(task, [item], 1, tell)
+            for one in died:
+                tell(one, Failure(DIED))
+
+    def _pass(
+        self,
+        task: Callable[[TaskT], ResultT],
+        items: Sequence[TaskT],
+        width: int | None,
+        tell: Callable[[TaskT, ResultT | Failure], None],
+    ) -> tuple[list[TaskT], list[TaskT]]:
+        """Items that ran when a process died and took the pool along, and those that had not begun; both empty if none died."""
+        with self.executors(width) as executor:
+            futures = {executor.submit(partial(_guarded, task), item): item for item in items}
+            try:
+                return _watch(futures, tell)
+            finally:
+                for future in futures:
+                    future.cancel()
+
+
+def _watch(
+    futures: dict[Future[ResultT | Failure], TaskT], tell: Callable[[TaskT, ResultT | Failure], None]
+) -> tuple[list[TaskT], list[TaskT]]:
+    """Polls, so that an interrupt from the keyboard is heard."""
+    pending, begun = set(futures), set[Future[ResultT | Failure]]()
+    lost: set[Future[ResultT | Failure]] = set()
+    while pending:
+        done, pending = wait(pending, timeout=0.2, return_when="FIRST_COMPLETED")
+        for future in done:
+            try:
+                tell(futures[future], future.result())
+            except BrokenProcessPool:
+                lost.add(future)
+            except CancelledError:
+                raise SweepError("the scheduler is gone; what was finished is kept, the same command resumes") from None
+            except HippodromeError:
+                raise
+            except Exception as error:  # Dask's KilledWorker: it has tried the task on several workers already
+                tell(futures[future], Failure(_said(error)))
+        if not lost:
+            begun = {future for future in pending if future.running()}
+    suspects = [item for future, item in futures.items() if future in lost and (future in begun or not begun)]
+    return suspects, [item for future, item in futures.items() if future in lost and begun and future not in begun]
+
+
+def local_processes(workers: int) -> Callable[[int | None], AbstractContextManager[Executor]]:
+    """Fresh processes of this machine."""
+    return lambda width: process_pool(width or workers)
+
+
+def dask_cluster(address: str) -> Callable[[int | None], AbstractContextManager[Executor]]:
+    """The workers of a running cluster. Raises SweepError if the package is missing; on use, if nobody answers."""
+    try:
+        from distributed import Client
+    except ModuleNotFoundError:
+        raise SweepError("the package 'distributed' is missing; install the extra: pip install 'hippodrome[dask]'") from None
+
+    @contextmanager
+    def connected(_: int | None) -> Iterator[Executor]:
+        try:
+            client = Client(address, timeout=CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
+        except (OSError, ValueError) as error:
+            raise SweepError(f"--scheduler {address}: no Dask scheduler answers ({_said(error)})") from None
+        with client, client.get_executor(pure=False) as executor:  # type: ignore[no-untyped-call]
+            yield executor
+
+    return connected
+
+
+def _guarded(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT | Failure:
+    """Errors come back as values: a bug in one cell must not lose a night of others."""
+    try:
+        return task(item)
+    except HippodromeError as error:
+        return Failure(str(error))
+    except Exception as error:
+        return Failure(_said(error))
+
+
+def _said(error: BaseException) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"

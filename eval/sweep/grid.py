@@ -1,0 +1,126 @@
+"""The cells of a sweep: scenarios x seeds x values of parameters, each an ordinary scenario with a key of its own."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+import hippodrome.core.types
+from hippodrome.core.types import HippodromeError
+from hippodrome.eval.scenario_files import read_scenario
+from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.self_motion import NOISE_LEVELS
+
+CODE = ("core/**/*.py", "sim/**/*.py", "proto/**/*.py", "eval/*.py", "eval/baselines/**/*.py")  # what figures come from
+MAX_CELLS = 100_000  # a slip of the keyboard, not a sweep
+
+
+class SweepError(HippodromeError):
+    """A grid that cannot be made, or cells that cannot be run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A key of the scenario and the values that it takes in turn."""
+
+    key: str  # dotted, as in docs/scenarios.md
+    values: tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One point of the grid."""
+
+    scenario: Scenario
+    parameters: tuple[tuple[str, str], ...]  # key and value as JSON: hashable, and the same on every machine
+
+    @property
+    def label(self) -> str:
+        """How tables name the parameters."""
+        return ", ".join(f"{key}={value.strip(chr(34))}" for key, value in self.parameters) or "as written"
+
+    @property
+    def name(self) -> str:
+        return f"{self.scenario.name}, seed {self.scenario.seed}, {self.label}"
+
+    @property
+    def key(self) -> str:
+        """Folder of the cell: of its scenario, effective configuration and code, so that nothing stale is taken for finished."""
+        text = json.dumps([self.scenario.model_dump_json(), code_sha256()])
+        return f"{self.scenario.name}-{self.scenario.seed}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+
+
+def parse_parameter(text: str) -> Parameter:
+    """``KEY=V1,V2``; values as YAML. Raises ValueError."""
+    key, equals, values = text.partition("=")
+    try:
+        found = yaml.safe_load(f"[{values}]")
+    except yaml.YAMLError:
+        found = None
+    if not equals or not all(part.isidentifier() for part in key.split(".")) or not isinstance(found, list) or not found:
+        raise ValueError(f"'{text}' is not KEY=VALUE,VALUE like noise=paper,harsh or mapping.traffic.vehicles=0,8")
+    return Parameter(key, tuple(found))
+
+
+def make_grid(paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Sequence[Parameter]) -> list[Cell]:
+    """All cells, in the order given. Raises HippodromeError on what is no scenario, and on cells that are twice there."""
+    count = len(paths) * len(seeds or [0])
+    for parameter in parameters:
+        count *= len(parameter.values)
+    if count > MAX_CELLS:
+        raise SweepError(f"{count} cells, the limit is {MAX_CELLS}")
+    chosen: Sequence[int | None] = seeds or (None,)
+    cells = [cell for path in paths for seed in chosen for cell in _cells(read_scenario(path, None, seed), parameters)]
+    seen: dict[tuple[str, int, str], Cell] = {}
+    for cell in cells:
+        if seen.setdefault((cell.scenario.name, cell.scenario.seed, cell.label), cell) is not cell:
+            raise SweepError(f"{cell.name}: twice in the grid; give each scenario a name of its own and each value once")
+    return cells
+
+
+def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
+    """The scenario with one key replaced, checked as if it stood in the file."""
+    values = scenario.model_dump()
+    *parents, last = key.split(".")
+    place: Any = values
+    for part in parents:
+        if part == "noise" and isinstance(place[part], str):  # a level's name stands for its values
+            place[part] = NOISE_LEVELS[place[part]].model_dump()
+        place = place.get(part)
+        if not isinstance(place, dict):
+            raise SweepError(f"--set {key}: '{part}' has no keys of its own; see docs/scenarios.md")
+    place[last] = value
+    try:
+        return Scenario.model_validate(values)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        reason = "unknown key; see docs/scenarios.md" if first["type"] == "extra_forbidden" else first["msg"]
+        raise SweepError(f"--set {key}={value}: {reason}") from None
+
+
+@lru_cache(maxsize=1)
+def code_sha256() -> str:
+    """Of the code that figures come from."""
+    root, digest = Path(hippodrome.core.types.__file__).parent.parent, hashlib.sha256()
+    for path in sorted({path for pattern in CODE for path in root.glob(pattern)}):
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cells(scenario: Scenario, parameters: Sequence[Parameter]) -> Iterator[Cell]:
+    for values in product(*(parameter.values for parameter in parameters)):
+        chosen: Mapping[str, Any] = dict(zip((parameter.key for parameter in parameters), values, strict=True))
+        changed = scenario
+        for key, value in chosen.items():
+            changed = with_value(changed, key, value)
+        yield Cell(changed, tuple((key, json.dumps(value, sort_keys=True)) for key, value in chosen.items()))

@@ -1,0 +1,109 @@
+"""``hippodrome sweep``: a grid of cells, run anywhere, resumed where it stopped, merged from samples."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from hippodrome.eval.pool import progress_bar
+from hippodrome.eval.results import Results, to_json, write_results
+from hippodrome.eval.sweep.cell import ROLES, CellResult, CellTask, RecordingTask, make_recording, run_cell
+from hippodrome.eval.sweep.executors import Failure, Runner, dask_cluster, local_processes
+from hippodrome.eval.sweep.grid import Cell, Parameter, SweepError, code_sha256, make_grid
+from hippodrome.eval.sweep.table import pooled_rows, sweep_markdown
+from hippodrome.proto.atomic import write_atomically
+from hippodrome.sim.record import RecordingPlan
+from hippodrome.sim.render.probe import require_gl
+
+RESULTS, TABLE, CELL = "results.json", "table.md", "cell.json"
+
+
+def sweep(
+    paths: Sequence[Path],
+    seeds: Sequence[int] | None,
+    parameters: Sequence[Parameter],
+    workers: int,
+    scheduler: str | None,
+    out: Path,
+) -> bool:
+    """Run what is not finished, then merge; whether every cell has a result. Raises HippodromeError on bad input."""
+    out = out.resolve()  # a cluster's workers have a working directory of their own
+    cells = make_grid(paths, seeds, parameters)
+    if scheduler is None:
+        require_gl()
+    executors = dask_cluster(scheduler) if scheduler else local_processes(workers)
+    finished = {cell: result for cell in cells if (result := _finished(cell, out)) is not None}
+    kept, failures = len(finished), dict[Cell, str]()
+
+    def ended(task: CellTask, result: CellResult | Failure) -> None:
+        if isinstance(result, Failure):
+            failures[task.cell] = result.cause
+            return
+        write_atomically(_path(task.cell, out), to_json(result.model_dump(mode="python")).encode())
+        finished[task.cell] = result
+
+    waiting = [cell for cell in cells if cell not in finished]
+    with progress_bar() as progress:
+        runner = Runner(executors, progress)
+        runner.run("record", make_recording, _recordings(waiting, out), _let_pass)
+        tasks = [CellTask(cell, out, code_sha256()) for cell in waiting]
+        runner.run("cells", run_cell, tasks, ended)
+    _merge(cells, {cell: _read(_path(cell, out)) for cell in cells if cell in finished}, failures, out)
+    print(f"{len(cells)} cell(s): {kept} kept, {len(finished) - kept} run, {len(failures)} failed\n"
+          f"results: {out / RESULTS}\ntable:   {out / TABLE}")  # fmt: skip
+    for cell, cause in failures.items():
+        print(f"failed: {cell.name}: {cause}")
+    return not failures
+
+
+def _recordings(cells: Sequence[Cell], out: Path) -> list[RecordingTask]:
+    """Each drive once, however many cells it serves."""
+    plans = {RecordingPlan(_driven(cell), role, out) for cell in cells for role in ROLES}
+    return [RecordingTask(plan, code_sha256()) for plan in sorted(plans, key=lambda plan: (plan.scenario.name, plan.seed))]
+
+
+def _driven(cell: Cell) -> Any:
+    """The scenario with whatever no drive depends on as it is by default: cells that differ in these share recordings."""
+    fields = type(cell.scenario).model_fields
+    constants = ("mapper", "refine", "localizer", "thresholds", "description")
+    return cell.scenario.model_copy(update={name: fields[name].default for name in constants})
+
+
+def _let_pass(_: RecordingTask, __: str | Failure) -> None:
+    """A drive that cannot be made fails again, with its cause, in each cell that needs it."""
+
+
+def _path(cell: Cell, out: Path) -> Path:
+    return out / "cells" / cell.key / CELL
+
+
+def _finished(cell: Cell, out: Path) -> CellResult | None:
+    return _read(_path(cell, out)) if _path(cell, out).exists() else None
+
+
+def _read(path: Path) -> CellResult:
+    try:
+        return CellResult.model_validate(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError, ValueError, ValidationError, RecursionError) as error:
+        raise SweepError(
+            f"{path}: not a cell's result ({' '.join(str(error).split())[:100]}); delete it to run the cell again"
+        ) from None
+
+
+def _merge(cells: Sequence[Cell], finished: dict[Cell, CellResult], failures: dict[Cell, str], out: Path) -> None:
+    """``results.json`` as of ``hippodrome eval``, each scenario named with its setting, and the pooled table beside it."""
+    rows = pooled_rows(finished)
+    scenarios = tuple(_named(cell, finished[cell]) for cell in cells if cell in finished)
+    failed = [(cell.name, failures[cell]) for cell in cells if cell in failures]
+    extra: dict[str, Any] = {"pooled": rows, "failures": [{"cell": name, "cause": cause} for name, cause in failed]}
+    write_results(out / RESULTS, Results(scenarios=scenarios, **extra))
+    write_atomically(out / TABLE, sweep_markdown(rows, failed).encode())
+
+
+def _named(cell: Cell, found: CellResult) -> Any:
+    name = f"{found.result.name} ({cell.label})" if cell.parameters else found.result.name
+    return found.result.model_copy(update={"name": name, "parameters": found.parameters})

@@ -1,0 +1,98 @@
+"""The merged table: one row for each setting and method, from the samples of all its cells, with the worst beside the mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hippodrome.eval.metrics import pool
+from hippodrome.eval.results import Row, summarize
+from hippodrome.eval.sweep.cell import CellResult
+from hippodrome.eval.sweep.grid import Cell
+
+NONE = "-"
+HEAD = ("setting", "method", "runs", "failed", "APE mean (m)", "median", "p95", "max", "worst run", "RPE 20 m (m)",
+        "localized", "localization mean (m)", "p95", "max", "false fixes")  # fmt: skip
+
+
+def pooled_rows(finished: Mapping[Cell, CellResult]) -> list[dict[str, Any]]:
+    """Settings in the order of the grid, methods in the order of the tables."""
+    settings: dict[str, list[tuple[Cell, CellResult]]] = {}
+    for cell, result in finished.items():
+        settings.setdefault(cell.label, []).append((cell, result))
+    return [
+        _pooled(label, method, cells)
+        for label, cells in settings.items()
+        for method in dict.fromkeys(row.method for _, one in cells for row in one.result.rows)
+    ]
+
+
+def _pooled(label: str, method: str, cells: Sequence[tuple[Cell, CellResult]]) -> dict[str, Any]:
+    rows = [(cell, row) for cell, one in cells for row in one.result.rows if row.method == method]
+    samples = [one.samples[method] for _, one in cells if method in one.samples]
+    pooled = {
+        name: summarize(pool([part[name].score() for part in samples if name in part])).model_dump()
+        for name in ("ape", "rpe", "rpe_20m", "localization")
+        if any(name in part for part in samples)
+    }
+    return {
+        "setting": label,
+        "parameters": cells[0][1].parameters,
+        "method": method,
+        "runs": len(rows),
+        "failed": [{"cell": cell.name, "cause": row.failure} for cell, row in rows if row.failure is not None],
+        "worst": _worst(rows),
+        "localized": _localized(rows),
+        **pooled,
+    }
+
+
+def _worst(rows: Sequence[tuple[Cell, Row]]) -> dict[str, Any] | None:
+    scored = [(row.ape.mean_m, cell) for cell, row in rows if row.ape is not None]
+    if not scored:
+        return None
+    mean_m, cell = max(scored, key=lambda one: one[0])
+    return {"cell": cell.name, "scenario": cell.scenario.name, "seed": cell.scenario.seed, "ape_mean_m": mean_m}
+
+
+def _localized(rows: Sequence[tuple[Cell, Row]]) -> dict[str, int] | None:
+    found = [row.localization for _, row in rows if row.localization is not None]
+    if not found:
+        return None
+    fixes = sum(one.false_fixes or 0 for one in found)
+    return {"successes": sum(bool(one.success) for one in found), "of": len(found), "false_fixes": fixes}
+
+
+def sweep_markdown(rows: Sequence[Mapping[str, Any]], failures: Sequence[tuple[str, str]]) -> str:
+    """The table, and the cells that have no result."""
+    lines = ["# Sweep", "", f"| {' | '.join(HEAD)} |", "|---|---|" + "---:|" * (len(HEAD) - 2)]
+    lines += [f"| {' | '.join(_line(row))} |" for row in rows]
+    lines += ["", "Means, percentiles and maxima are over the samples of all runs together; the worst run is the one with the "
+              "greatest mean.", ""]  # fmt: skip
+    if failures:
+        lines += [f"## {len(failures)} cell(s) without a result", "", "The same command runs these, and only these, again.", ""]
+        lines += [f"- {name}: {cause}" for name, cause in failures]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _line(row: Mapping[str, Any]) -> list[str]:
+    ape, worst, localized = row.get("ape"), row["worst"], row["localized"]
+    located = row.get("localization")
+    return [
+        row["setting"],
+        row["method"],
+        str(row["runs"]),
+        str(len(row["failed"])),
+        *_figures(ape, ("mean_m", "median_m", "p95_m", "max_m")),
+        f"{worst['ape_mean_m']:.2f} ({worst['scenario']}, seed {worst['seed']})" if worst else NONE,
+        *_figures(row.get("rpe_20m"), ("mean_m",)),
+        f"{localized['successes']} of {localized['of']}" if localized else NONE,
+        *_figures(located, ("mean_m", "p95_m", "max_m")),
+        str(localized["false_fixes"]) if localized else NONE,
+    ]
+
+
+def _figures(summary: Mapping[str, Any] | None, names: Sequence[str]) -> list[str]:
+    return [NONE if summary is None or not np.isfinite(summary[name]) else f"{summary[name]:.2f}" for name in names]

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import contextlib
 import json
+import multiprocessing
 import subprocess
 import threading
+import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO
@@ -130,16 +132,25 @@ def _execute(task: RunTask) -> str | None:
         feeder = threading.Thread(target=_feed, args=(process.stdin, task.drive), daemon=True)
         feeder.start()
         try:
-            status = process.wait(limit_s)
-        except subprocess.TimeoutExpired:
-            return f"hung: no end after {limit_s:.0f} s"
+            status = _ended(process, limit_s)
         finally:
             process.kill()
             process.wait()
             feeder.join()
+    if status is None:
+        return f"hung: no end after {limit_s:.0f} s"
     if status == 0 and (task.folder / "result.json").exists():
         return None
     return f"crashed: {_ending(status)}; last words: {_last_line(log_path)}"
+
+
+def _ended(process: subprocess.Popen[bytes], limit_s: float) -> int | None:
+    """The exit status; None beyond the limit, or once the command is gone that this process works for: nobody waits any more."""
+    command, end_s = multiprocessing.parent_process(), time.monotonic() + limit_s
+    while time.monotonic() < end_s and (command is None or command.is_alive()):
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return process.wait(min(1.0, limit_s))
+    return None
 
 
 def _write_job(task: RunTask) -> None:

@@ -20,7 +20,8 @@ class Noise:
     lateral_m: float = 0.3  # of the vehicle from the lane's centreline
     lane_heading_rad: float = 0.05  # of the vehicle from the lane's direction
     closure_factor: float = 1.0  # on the closures' own sigmas
-    step_tail: float = 0.25  # 1 / degrees of freedom of the steps' Student-t: 4, heavy tails with a variance; 0: normal
+    scale_tail: float = 0.25  # 1 / degrees of freedom of the scale's Student-t: 4, as it may jump; 0: normal
+    road_tail: float = 1.0  # likewise of the road's: 1 (Cauchy), as turns are drawn otherwise than driven
 
     def step_sigmas(self, length_m: FloatArray) -> FloatArray:
         """Sigmas (N, 4) of along, across, heading, log scale over steps of the given lengths."""
@@ -39,17 +40,19 @@ class Noise:
 BEND_CUT_M2 = 2.0
 BEND_SHIFT_M = 1.0  # along-track shift between the bend that is drawn and the one that is driven
 STANDSTILL_M = 0.1  # a step shorter than this is as uncertain as this: quantised motions, gyro noise while standing
-FLOORS = {"along": 0.005, "across": 0.005, "heading": 0.0005, "log_scale": 0.0003, "lateral_m": 0.1, "lane_heading_rad": 0.05}
-# below these, no sensor or driver is believable, and the equations lose their condition
+FLOORS = {"along": 0.005, "across": 0.005, "heading": 0.0005, "log_scale": 0.0003, "lateral_m": 0.2, "lane_heading_rad": 0.05}
+# below these, no sensor or driver is believable, and the equations lose their condition. A path can follow its lane as closely as
+# it likes: that a driver wanders and a network is off by decimetres is not seen in the residuals
 
 
-def per_freedom(residual: FloatArray, weight: FloatArray, used: FloatArray) -> FloatArray:
-    """Squares of whitened residuals (N, M) per degree of freedom that the solution left them, (M,).
+def per_freedom(residual: FloatArray, count: float, used: FloatArray) -> FloatArray:
+    """Squares of ``count`` whitened, weighted residuals (N, M) per degree of freedom that the solution left them, (M,).
 
-    Helmert's variance components: of N weighted residuals, the estimate used up ``used`` = tr(J Sigma J^T). Unlike expectation
-    maximisation it converges in a few rounds; one round may change a sigma at most by ``LARGEST_CHANGE``.
+    Helmert's variance components: the estimate used up ``used`` = tr(J Sigma J^T). It shares its fixed point with expectation
+    maximisation (Student-t: Lange, Little, Taylor 1989) but comes there in a few rounds; one round may change a sigma at most by
+    ``LARGEST_CHANGE``. The number of residuals counts, not the sum of their weights: a weight above 1 adds no freedom.
     """
-    freedom = np.maximum(np.sum(weight, axis=0) - used, 1e-3 * len(residual) + 1.0)
+    freedom = np.maximum(count - used, 1e-3 * count + 1.0)
     ratio: FloatArray = np.clip(np.sum(residual**2, axis=0) / freedom, LARGEST_CHANGE**-2, LARGEST_CHANGE**2)
     return ratio
 

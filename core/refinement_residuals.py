@@ -17,7 +17,6 @@ from hippodrome.core.types import Edges, FloatArray, Visits
 GAIN_SIGMA = 0.05  # prior: cheap gyros are calibrated to a few percent
 BIAS_SIGMA_RADPS = 0.02  # prior: about 1 deg/s
 GEMAN_MCCLURE = 3.0  # sigmas at which a closure has lost three quarters of its weight
-HUBER = 1.5  # sigmas
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,11 +53,12 @@ class PairGroup(Group):
     border: FloatArray  # (N, M, 2)
 
 
-def odometry(state: State, visits: Visits, noise: Noise) -> PairGroup:
-    """Components: along, across, heading, log scale, between each visit and the next (N = S - 1), Student-t weighted.
+def odometry(state: State, visits: Visits, noise: Noise, unseen: FloatArray) -> PairGroup:
+    """Components: along, across, heading, log scale, between each visit and the next (N = S - 1).
 
-    Where the lane is drawn otherwise than driven (lane changes, kinks of imported networks) a few steps are far off. Under a
-    normal density they alone would set the noise of all steps, and a loose scale lets whole roads slide.
+    The scale may jump: its steps are Student-t. Their weights take the expected square, of which ``unseen`` (N,) is what the
+    data leave open: where nothing tells the scale its steps look small without being so. Gyros and wheels have no outliers: where
+    a turn is drawn otherwise than driven, it is the road that is wrong.
     """
     a, b = state.poses[:-1], state.poses[1:]
     motion, dt = visits.motion[1:], np.diff(visits.t_s)
@@ -71,13 +71,14 @@ def odometry(state: State, visits: Visits, noise: Noise) -> PairGroup:
     border = np.zeros((len(a), 4, 2))
     border[:, 2, 0], border[:, 2, 1] = -motion[:, 2], -dt
     root = 1.0 / noise.step_sigmas(np.hypot(metres[:, 0], metres[:, 1]))
-    weight = (1.0 + noise.step_tail) / (1.0 + noise.step_tail * (residual * root) ** 2)
+    weight = np.ones_like(residual)
+    weight[:, 3] = student_weight((residual[:, 3] ** 2 + unseen) * root[:, 3] ** 2, noise.scale_tail)
     root = root * np.sqrt(weight)
     return PairGroup(residual * root, here * root[..., None], weight, there * root[..., None], border * root[..., None])
 
 
 def road(state: State, targets: Targets, noise: Noise) -> Group:
-    """Components: across the lane and lane heading (Huber), along the lane."""
+    """Components: across the lane and lane heading (both Student-t), along the lane."""
     cos, sin = np.cos(targets.heading_rad), np.sin(targets.heading_rad)
     off = state.poses[:, :2] - targets.points_m
     lateral, turned_sigma = noise.road_sigmas(targets.curvature_1pm, targets.freedom_m)
@@ -89,11 +90,17 @@ def road(state: State, targets: Targets, noise: Noise) -> Group:
     here[:, 0, 0], here[:, 0, 1] = -sin / lateral, cos / lateral
     here[:, 1, 2] = 1.0 / turned_sigma
     here[:, 2, 0], here[:, 2, 1] = cos / targets.along_sigma_m, sin / targets.along_sigma_m
-    weight = np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12))
+    weight = student_weight(residual**2, noise.road_tail)
     weight[:, 2] = 1.0
     weight *= targets.on_road[:, None]
     root = np.sqrt(weight)
     return Group(residual * root, here * root[..., None], weight)
+
+
+def student_weight(sq: FloatArray, tail: float) -> FloatArray:
+    """Weights of squared whitened residuals under a Student-t with 1 / ``tail`` degrees of freedom."""
+    weight: FloatArray = (1.0 + tail) / (1.0 + tail * sq)
+    return weight
 
 
 def closures(state: State, edges: Edges, noise: Noise) -> PairGroup:

@@ -12,6 +12,7 @@ from hippodrome.core.matching.lane_choice import freedom_m
 from hippodrome.core.matching.projection import reproject
 from hippodrome.core.matching.route_line import BoolArray, RouteLine
 from hippodrome.core.noise_estimation import Noise, per_freedom, reestimated
+from hippodrome.core.refinement_covariance import calibrated, posterior
 from hippodrome.core.refinement_residuals import State, Targets, closures, moved, normal_equations, odometry, road
 from hippodrome.core.types import Edges, FloatArray, Visits
 
@@ -20,7 +21,7 @@ from hippodrome.core.types import Edges, FloatArray, Visits
 class SolverConfig:
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    along_sigma_m: tuple[float, ...] = (3.0, 6.0, 12.0, np.inf, np.inf, np.inf, np.inf, np.inf)  # per round: let go slowly
+    along_sigma_m: tuple[float, ...] = (3.0, 6.0, 12.0, *[np.inf] * 8)  # per round: let go slowly, then let the noise settle
     inner_iterations: int = 2
     reprojection_m: float = 4.0  # arc length that a vertex may slide in one round
     unvouched_weight: float = 1e-6  # of the road where nothing vouches for it: too little to pull, enough to be determined
@@ -28,7 +29,6 @@ class SolverConfig:
 
 
 MOST_CG_STEPS = 100  # 10-30 are usual; a step cut short is made up for by the next round
-WANDER_RAD = 0.01  # a wander of 0.1 m over some 60 m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,16 +55,25 @@ def optimise(
     """
     points, heading = on_line(line, arc_m)
     state = State(np.column_stack([points, heading]), log_scale, np.zeros(2))
-    noise = Noise()
+    noise, unseen = Noise(), scale_variance(state, visits, Noise())
     on_road = np.maximum(vouched, config.unvouched_weight)
     for along_sigma_m in config.along_sigma_m:
         arc_m = reproject(line, state.poses[:, :2], arc_m, config.reprojection_m)
         points, heading = on_line(line, arc_m)
-        targets = Targets(points, heading, curvature(line, arc_m), freedom_m(line, arc_m, free), on_road, along_sigma_m)
+        freedom = np.hypot(freedom_m(line, arc_m, free), config.survey_sigma_m)
+        targets = Targets(points, heading, curvature(line, arc_m), freedom, on_road, along_sigma_m)
         for _ in range(config.inner_iterations):
-            state, factor = gauss_newton_step(state, visits, edges, targets, noise)
-        noise = estimate_noise(state, visits, edges, targets, noise, factor)
-    return Solution(state, arc_m, noise, calibrated(marginals(factor)[0], noise, config))
+            state, factor = gauss_newton_step(state, visits, edges, targets, noise, unseen)
+        noise, unseen = estimate_noise(state, visits, edges, targets, noise, unseen, factor)
+    groups = odometry(state, visits, noise, unseen), road(state, targets, noise), closures(state, edges, noise)
+    return Solution(state, arc_m, noise, calibrated(posterior(state, *groups, edges), config.survey_sigma_m))
+
+
+def scale_variance(state: State, visits: Visits, noise: Noise) -> FloatArray:
+    """Variance (S - 1,) of the steps of the log scale before anything is seen."""
+    metres = np.exp(state.log_scale[:-1]) * np.hypot(visits.motion[1:, 0], visits.motion[1:, 1])
+    variance: FloatArray = noise.step_sigmas(metres)[:, 3] ** 2
+    return variance
 
 
 def curvature(line: RouteLine, arc_m: FloatArray, half_m: float = 4.0) -> FloatArray:
@@ -75,21 +84,12 @@ def curvature(line: RouteLine, arc_m: FloatArray, half_m: float = 4.0) -> FloatA
     return magnitude
 
 
-def calibrated(covariance: FloatArray, noise: Noise, config: SolverConfig) -> FloatArray:
-    """The formal covariance (S, 4, 4) plus what never averages out: the driver's wander in the lane, and the network's own error.
-
-    In bends the wander is an along-track error too, so that it is added to both axes.
-    """
-    place = noise.lateral_m**2 + config.survey_sigma_m**2
-    return covariance + np.diag([place, place, WANDER_RAD**2, 0.0])
-
-
 def gauss_newton_step(
-    state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise, tolerance: float = 1e-4
+    state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise, unseen: FloatArray, tolerance: float = 1e-4
 ) -> tuple[State, ChainFactor]:
-    """One step on the weighted squares; ``tolerance`` of the linear solution, relative to its energy."""
+    """One step on the weighted squares; ``unseen`` (S - 1,) as in ``odometry``; ``tolerance`` of the linear solution's energy."""
     tied = closures(state, edges, noise)
-    system = normal_equations(state, odometry(state, visits, noise), road(state, targets, noise), tied, edges)
+    system = normal_equations(state, odometry(state, visits, noise, unseen), road(state, targets, noise), tied, edges)
     cross = np.einsum("nmi,nmj->nij", tied.here, tied.there)
 
     def couple(x: FloatArray) -> FloatArray:
@@ -102,21 +102,24 @@ def gauss_newton_step(
     return moved(state, step, gyro_step), factor
 
 
-def estimate_noise(state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise, factor: ChainFactor) -> Noise:
-    """Squared whitened residuals per degree of freedom left, by kind."""
+def estimate_noise(
+    state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise, unseen: FloatArray, factor: ChainFactor
+) -> tuple[Noise, FloatArray]:
+    """Sigmas from squared whitened residuals per degree of freedom left, by kind, and what the scale's steps leave open."""
     own, next_ = marginals(factor)
-    steps, roads, tied = odometry(state, visits, noise), road(state, targets, noise), closures(state, edges, noise)
+    steps, roads, tied = odometry(state, visits, noise, unseen), road(state, targets, noise), closures(state, edges, noise)
     joint = np.block([[own[:-1], next_], [np.swapaxes(next_, 1, 2), own[1:]]])
     both = np.concatenate([steps.here, steps.there], axis=2)
-    steps_used = np.einsum("nmi,nij,nmj->m", both, joint, both)
+    steps_used = np.einsum("nmi,nij,nmj->nm", both, joint, both)
     roads_used = np.einsum("nmi,nij,nmj->m", roads.here, own, roads.here)
     plain_sq = np.sum(tied.residual**2, axis=1) / np.maximum(tied.weight[:, 0], 1e-12)
-    return reestimated(
+    updated = reestimated(
         noise,
-        per_freedom(steps.residual, steps.weight, steps_used),
-        per_freedom(roads.residual, roads.weight, roads_used),
+        per_freedom(steps.residual, len(steps.residual), np.sum(steps_used, axis=0)),
+        per_freedom(roads.residual, float(np.sum(targets.on_road)), roads_used),
         float(np.median(plain_sq)) if len(plain_sq) else None,
     )
+    return updated, steps_used[:, 3] / steps.weight[:, 3] * scale_variance(state, visits, noise)
 
 
 def on_line(line: RouteLine, arc_m: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -20,8 +20,8 @@ from hippodrome.core.matching.track import Track
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import FloatArray, StartPose
 
-PLACE_SIGMA_M = 1.5  # of the first refinement where lanes are parallel: half a lane
-FREE_M = 2.0  # lateral sigma that leaves the choice of the lane open, and that of a vehicle between two lanes
+PLACE_SIGMA_M = 2.5  # of the first refinement where lanes are parallel: most of a lane
+FREE_M = 4.0  # lateral sigma of more than a lane: the lane that the search happened to choose has no weight
 CHANGE_M = 15.0  # a lane change takes about this long either side of its middle
 
 

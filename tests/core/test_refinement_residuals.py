@@ -20,6 +20,7 @@ from hippodrome.core.refinement_solver import gauss_newton_step
 from hippodrome.core.types import EdgeKind, Edges, Visits
 
 COUNT = 30
+NOTHING_OPEN = np.zeros(COUNT - 1)  # what the data leave open of the scale's steps
 
 
 @pytest.fixture
@@ -55,20 +56,36 @@ def numeric(group_of, state, visit):
     return np.stack(columns, axis=-1)
 
 
-def test_a_step_far_off_loses_weight(problem):
+def test_only_the_scale_may_jump(problem):
     visits, _, _, state = problem
-    normal, heavy = (odometry(state, visits, Noise(step_tail=tail)) for tail in (0.0, 0.25))
-    expected = 1.25 / (1.0 + 0.25 * normal.residual**2)
-    np.testing.assert_allclose(heavy.weight, expected)
-    np.testing.assert_allclose(heavy.residual, normal.residual * np.sqrt(expected))
+    state = moved(state, np.outer(np.arange(COUNT) % 7 == 0, [0.0, 0.0, 0.0, 0.05]), np.zeros(2))
+    normal, heavy = (odometry(state, visits, Noise(scale_tail=tail), NOTHING_OPEN) for tail in (0.0, 0.25))
+    expected = 1.25 / (1.0 + 0.25 * normal.residual[:, 3] ** 2)
+    assert expected.min() < 0.5
+    np.testing.assert_allclose(heavy.weight, np.column_stack([np.ones((COUNT - 1, 3)), expected]))
+    np.testing.assert_allclose(heavy.residual[:, 3], normal.residual[:, 3] * np.sqrt(expected))
+
+
+def test_a_step_that_nothing_tells_has_the_weight_of_a_usual_one(problem):
+    visits, _, _, state = problem
+    noise = Noise()
+    metres = np.hypot(*visits.motion[1:, :2].T) * np.exp(state.log_scale[:-1])
+    steps = odometry(state, visits, noise, noise.step_sigmas(metres)[:, 3] ** 2)  # as open as before any data, residual 0
+    np.testing.assert_allclose(steps.weight[:, 3], 1.0)
+
+
+def test_a_turn_drawn_otherwise_than_driven_loses_weight(problem):
+    _, _, targets, state = problem
+    normal, heavy = (road(state, targets, Noise(road_tail=tail)) for tail in (0.0, 1.0))
+    np.testing.assert_allclose(heavy.weight, 2.0 / (1.0 + normal.residual**2) * [1.0, 1.0, 0.0] + [0.0, 0.0, 1.0])
 
 
 def test_jacobians_agree_with_differences(problem):
     visits, edges, targets, state = problem
-    quiet = Noise(lateral_m=50.0, lane_heading_rad=50.0, closure_factor=1e3, step_tail=0.0)  # robust weights then hardly change
-    steps, roads, tied = odometry(state, visits, quiet), road(state, targets, quiet), closures(state, edges, quiet)
+    quiet = Noise(lateral_m=50.0, lane_heading_rad=50.0, closure_factor=1e3, scale_tail=0.0)  # robust weights then hardly change
+    steps, roads, tied = odometry(state, visits, quiet, NOTHING_OPEN), road(state, targets, quiet), closures(state, edges, quiet)
     for visit in (0, 7, 20):
-        by_steps = numeric(lambda s: odometry(s, visits, quiet), state, visit)
+        by_steps = numeric(lambda s: odometry(s, visits, quiet, NOTHING_OPEN), state, visit)
         np.testing.assert_allclose(by_steps[visit, :, :3], steps.here[visit, :, :3], atol=1e-4)
         if visit:
             np.testing.assert_allclose(by_steps[visit - 1], steps.there[visit - 1], atol=1e-4)
@@ -84,21 +101,23 @@ def test_gyro_jacobian_agrees_with_differences(problem):
     for column in range(2):
         gyro = np.eye(2)[column] * step
         high, low = (
-            odometry(moved(state, np.zeros((COUNT, 4)), sign * gyro), visits, Noise(step_tail=0.0)).residual
+            odometry(moved(state, np.zeros((COUNT, 4)), sign * gyro), visits, Noise(scale_tail=0.0), NOTHING_OPEN).residual
             for sign in (1.0, -1.0)
         )
         np.testing.assert_allclose(
-            (high - low) / (2 * step), odometry(state, visits, Noise(step_tail=0.0)).border[:, :, column], atol=1e-4
+            (high - low) / (2 * step),
+            odometry(state, visits, Noise(scale_tail=0.0), NOTHING_OPEN).border[:, :, column],
+            atol=1e-4,
         )
 
 
 def test_the_optimum_is_gtsams(problem):
     """The same problem in GTSAM, with residuals written anew and differentiated numerically by it."""
     visits, edges, targets, state = problem
-    noise = Noise(step_tail=0.0)  # GTSAM's factors are normal
+    noise = Noise()
     ours = state
     for _ in range(60):
-        ours, _ = gauss_newton_step(ours, visits, edges, targets, noise, tolerance=1e-10)
+        ours, _ = gauss_newton_step(ours, visits, edges, targets, noise, NOTHING_OPEN, tolerance=1e-10)
     theirs = _gtsam_optimum(visits, edges, targets, state, noise, np.exp(ours.log_scale))
     np.testing.assert_allclose(ours.poses[:, :2], theirs.poses[:, :2], atol=2e-3)
     np.testing.assert_allclose(ours.poses[:, 2], theirs.poses[:, 2], atol=2e-4)
@@ -124,10 +143,13 @@ def _gtsam_optimum(visits, edges, targets, state, noise, scale):
             place = turned_back(a, b[:2] - a[:2]) - metres
             turn = b[2] - a[2] - (1.0 + g[0]) * visits.motion[i + 1, 2] - g[1] * (visits.t_s[i + 1] - visits.t_s[i])
             root = np.sqrt(max(scale[i] * lengths[i], 0.1))
-            sigmas = root * np.array([noise.along, noise.across, noise.heading, noise.log_scale])
-            return np.array([*place, turn, b[3] - a[3]]) / sigmas
+            return np.array([*place, turn]) / (root * np.array([noise.along, noise.across, noise.heading]))
 
         return error
+
+    def scale_error(i):
+        sigma = noise.log_scale * np.sqrt(max(scale[i] * lengths[i], 0.1))
+        return lambda a, b: np.array([b[3] - a[3]]) / sigma * np.sqrt(1.0 + noise.scale_tail)
 
     def road_error(i, component):
         tangent = np.array([np.cos(targets.heading_rad[i]), np.sin(targets.heading_rad[i])])
@@ -137,9 +159,9 @@ def _gtsam_optimum(visits, edges, targets, state, noise, scale):
         def error(a):
             off = a[:2] - targets.points_m[i]
             if component == 0:
-                return np.array([tangent[0] * off[1] - tangent[1] * off[0]]) / lateral
+                return np.array([tangent[0] * off[1] - tangent[1] * off[0]]) / lateral * np.sqrt(1.0 + noise.road_tail)
             if component == 1:
-                return np.array([a[2] - targets.heading_rad[i]]) / heading
+                return np.array([a[2] - targets.heading_rad[i]]) / heading * np.sqrt(1.0 + noise.road_tail)
             return np.array([tangent @ off]) / targets.along_sigma_m
 
         return error
@@ -170,12 +192,16 @@ def _gtsam_optimum(visits, edges, targets, state, noise, scale):
         model = gtsam.noiseModel.Robust.Create(robust, model) if robust is not None else model
         graph.add(gtsam.CustomFactor(model, keys, factor))
 
+    def student(tail):
+        """GTSAM's Cauchy loss of sqrt(1 + tail) r is the Student-t's of r."""
+        return gtsam.noiseModel.mEstimator.Cauchy.Create(np.sqrt((1.0 + tail) / tail))
+
     for i in range(COUNT - 1):
-        add([i, i + 1, gyro], step_error(i), 4)
+        add([i, i + 1, gyro], step_error(i), 3)
+        add([i, i + 1], scale_error(i), 1, student(noise.scale_tail))
     for i in range(COUNT):
         for component in range(3):
-            huber = gtsam.noiseModel.mEstimator.Huber.Create(1.5) if component < 2 else None
-            add([i], road_error(i, component), 1, huber)
+            add([i], road_error(i, component), 1, student(noise.road_tail) if component < 2 else None)
     for e in range(len(edges.source)):
         add(
             [int(edges.source[e]), int(edges.target[e])],
@@ -197,8 +223,8 @@ def test_the_gradient_vanishes_at_the_optimum(problem):
     visits, edges, targets, state = problem
     noise = Noise()
     for _ in range(60):
-        state, _ = gauss_newton_step(state, visits, edges, targets, noise, tolerance=1e-10)
+        state, _ = gauss_newton_step(state, visits, edges, targets, noise, NOTHING_OPEN, tolerance=1e-10)
     system = normal_equations(
-        state, odometry(state, visits, noise), road(state, targets, noise), closures(state, edges, noise), edges
+        state, odometry(state, visits, noise, NOTHING_OPEN), road(state, targets, noise), closures(state, edges, noise), edges
     )
     assert np.abs(system.rhs).max() < 1e-2 * np.sqrt(np.diagonal(system.diagonal, axis1=1, axis2=2)).max()

@@ -1,23 +1,27 @@
 """``hippodrome stress``: the default refinement from real frames, under errors it may meet, over towns and seeds.
 
 Every case starts from the same recorded frames of a town and seed and changes one thing: the self-motion (sensed anew), the loop
-closures (false ones added), or the road network (displaced, or with driven roads missing). Each row can be rerun alone by its
-scenario, seed and case.
+closures (false ones added), or the road network (displaced, with driven roads missing, or another town's). Cases of the same
+self-motion share one map. Each row is kept as soon as it is known, and can be rerun alone by its scenario, seed and case.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from time import process_time
 
 import numpy as np
 
+import hippodrome.core.types
 from hippodrome.core.refine import refine
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.se2 import interpolate
-from hippodrome.core.types import CognitiveMap, HippodromeError, MatchStatus, Trajectory
+from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, MatchStatus, StartPose, Trajectory
 from hippodrome.eval.calibration import nees, pose_errors
 from hippodrome.eval.figures.stress import draw_stress
 from hippodrome.eval.materials import RPE_DELTA_M
@@ -28,7 +32,8 @@ from hippodrome.eval.results import to_json
 from hippodrome.eval.run import make_recordings
 from hippodrome.eval.scenario_files import read_scenario
 from hippodrome.eval.stages import map_recording
-from hippodrome.eval.stress_table import WRONG_M, StressRow, stress_markdown
+from hippodrome.eval.stress_cases import FOREIGN_SEED, StressCase, chosen_cases, in_self_similar_grid
+from hippodrome.eval.stress_table import FAR_M, WRONG_M, StressRow, stress_markdown
 from hippodrome.eval.warm_up import warm_up
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import RecordingPlan, finish, sensed_anew
@@ -36,34 +41,7 @@ from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS, NoiseLevel
 from hippodrome.sim.survey import with_survey_error
-
-MISSING_ROADS = 2  # driven streets taken out of the network, both directions each
-
-
-@dataclass(frozen=True, slots=True)
-class StressCase:
-    """One thing that goes wrong."""
-
-    name: str
-    noise: NoiseLevel = "paper"
-    false_closures: float = 0.0  # share of the map's closures, added between random vertices
-    survey_error_m: float = 0.0
-    scale_jump: float = 0.0  # standard deviation of ln(scale) at each jump
-    gyro_bias_degps: float | None = None
-    missing_roads: int = 0
-
-
-CASES = (
-    StressCase("paper", false_closures=0.01),
-    StressCase("no false closures"),
-    StressCase("false closures 20 %", false_closures=0.20),
-    StressCase("survey error 0.5 m", survey_error_m=0.5),
-    StressCase("scale jumps 10 %", scale_jump=0.10),
-    StressCase("drift x 3", gyro_bias_degps=0.15),
-    StressCase("missing roads", missing_roads=MISSING_ROADS),
-    StressCase("realistic", noise="realistic"),
-    StressCase("harsh", noise="harsh"),
-)
+from hippodrome.sim.town import build_town
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,17 +51,30 @@ class StressTask:
     scenario: Scenario
     cases: tuple[StressCase, ...]
     out: Path
+    path: Path  # of the scenario, for the command that reruns a row
+
+    def plan(self) -> RecordingPlan:
+        return RecordingPlan(self.scenario, "mapping", self.out)
+
+    def rerun(self, case: StressCase) -> str:
+        return f"hippodrome stress {self.path} --seeds {self.scenario.seed} --case '{case.name}'"
+
+    def row_file(self, case: StressCase) -> Path:
+        """Where the case's row is kept: named by all that it depends on."""
+        text = json.dumps(
+            [self.plan().folder().name, self.scenario.model_dump_json(exclude={"town"}), asdict(case), _code_sha256()]
+        )
+        return self.out / "rows" / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.json"
 
 
 def stress(paths: Sequence[Path], seeds: Sequence[int], names: Sequence[str], workers: int, out: Path) -> None:
     """Run cases over scenarios x seeds; writes ``stress.json``, ``stress.md`` and ``stress.png``."""
-    cases = tuple(case for case in CASES if not names or case.name in names)
-    if unknown := set(names) - {case.name for case in CASES}:
-        raise HippodromeError(f"no stress case '{sorted(unknown)[0]}'; there are: {', '.join(case.name for case in CASES)}")
-    tasks = [task for path in paths for seed in seeds for task in _tasks(read_scenario(path, seed=seed), cases, out)]
+    cases = chosen_cases(names)
+    tasks = [task for path in paths for seed in seeds for task in _tasks(path, seed, cases, out, path == paths[0])]
     with worker_pool(workers) as pool:
-        make_recordings([RecordingPlan(task.scenario, "mapping", out) for task in tasks], pool)
+        make_recordings([task.plan() for task in tasks], pool)
         rows = [row for part in pool.run("refine", run_cases, tasks, weight=lambda task: len(task.cases)) for row in part]
+    rows.sort(key=lambda row: [case.name for case in cases].index(row.case))
     write_atomically(
         out / "stress.json", to_json({"cases": [asdict(case) for case in cases], "rows": [asdict(row) for row in rows]}).encode()
     )
@@ -93,40 +84,63 @@ def stress(paths: Sequence[Path], seeds: Sequence[int], names: Sequence[str], wo
     print(f"{text}\n{out / 'stress.json'}, {out / 'stress.md'}, {out / 'stress.png'}")
 
 
-def _tasks(scenario: Scenario, cases: Sequence[StressCase], out: Path) -> list[StressTask]:
-    """Cases grouped by the lateral wander of their noise level: that alone makes another drive, and other frames."""
-    groups: dict[NoiseLevel, list[StressCase]] = {}
+def _tasks(path: Path, seed: int, cases: Sequence[StressCase], out: Path, with_grid: bool) -> list[StressTask]:
+    """Cases grouped by drive: the lateral wander of their noise level makes another one, and so does the self-similar grid."""
+    scenario = read_scenario(path, seed=seed)
+    groups: dict[tuple[NoiseLevel, bool], list[StressCase]] = {}
     for case in cases:
-        groups.setdefault(case.noise, []).append(case)
-    return [StressTask(scenario.model_copy(update={"noise": level}), tuple(group), out) for level, group in groups.items()]
+        if with_grid or not case.self_similar:
+            groups.setdefault((case.noise, case.self_similar), []).append(case)
+    return [
+        StressTask(
+            (in_self_similar_grid(scenario, out) if grid else scenario).model_copy(update={"noise": level}),
+            tuple(group),
+            out,
+            path,
+        )
+        for (level, grid), group in groups.items()
+    ]
 
 
 def run_cases(task: StressTask) -> list[StressRow]:
-    """Every case of one recording."""
+    """Every case of one recording; those of an earlier run of the same code are read back."""
+    rows, maps = {}, dict[str, CognitiveMap]()
+    for case in task.cases:
+        file = task.row_file(case)
+        if not file.exists():
+            row = _run_case(case, task, maps)
+            write_atomically(file, to_json(asdict(row)).encode())
+        rows[case.name] = StressRow(**json.loads(file.read_text()))
+    return list(rows.values())
+
+
+def _run_case(case: StressCase, task: StressTask, maps: dict[str, CognitiveMap]) -> StressRow:
+    """``maps``: those made already, by their self-motion."""
     warm_up()
-    plan = RecordingPlan(task.scenario, "mapping", task.out)
-    recording, town = finish(plan), plan.town()
-    return [_run_case(case, task.scenario, recording, town.network) for case in task.cases]
-
-
-def _run_case(case: StressCase, scenario: Scenario, recording: Recording, network: RoadNetwork) -> StressRow:
-    level = NOISE_LEVELS[case.noise]
-    motion = {"scale_jump": max(case.scale_jump, level.scale_jump)}
-    if case.gyro_bias_degps is not None:
-        motion["gyro_bias_degps"] = case.gyro_bias_degps
-    sensed = sensed_anew(recording, level.model_copy(update=motion), np.random.default_rng([scenario.seed, 3]))
+    scenario, recording, town = task.scenario, finish(task.plan()), task.plan().town()
+    noise = case.self_motion()
+    if noise.model_dump_json() not in maps:
+        sensed = sensed_anew(recording, noise, np.random.default_rng([scenario.seed, 3]))
+        maps[noise.model_dump_json()], _ = map_recording(sensed.observations(), scenario.mapper)
     rng = np.random.default_rng([scenario.seed, 4])
-    semi_metric, _ = map_recording(sensed.observations(), scenario.mapper)
-    semi_metric = with_false_closures(semi_metric, case.false_closures, rng)
-    roads = with_survey_error(network, max(case.survey_error_m, level.survey_error_m), rng)
-    roads = without_roads(roads, driven_streets(recording, network, case.missing_roads, rng))
-    row = StressRow(scenario.name, scenario.seed, case.name, len(semi_metric.t_s))
+    semi_metric = with_false_closures(maps[noise.model_dump_json()], case.false_closures, rng)
+    roads = town.network
+    if case.foreign:  # an imported town, too, is answered with a generated one
+        elsewhere = scenario.town.model_copy(update={"network": None})
+        roads = build_town(elsewhere, scenario.seed + FOREIGN_SEED, task.out / "towns").network
+    roads = with_survey_error(roads, max(case.survey_error_m, NOISE_LEVELS[case.noise].survey_error_m), rng)
+    roads = without_roads(roads, driven_streets(recording, town.network, case.missing_roads, rng))
+    start = StartPose(*(float(value) for value in recording.ground_truth().poses[0])) if case.start_known else None
+    row = StressRow(scenario.name, scenario.seed, case.name, len(semi_metric.t_s), rerun=task.rerun(case))
     began = process_time()
     try:
-        refined = refine(semi_metric, roads, replace(scenario.refine, mode="default")).cognitive_map
+        refined = refine(semi_metric, roads, replace(scenario.refine, mode="default"), start).cognitive_map
     except HippodromeError as error:
         return replace(row, failure=str(error), cpu_s=process_time() - began)
-    return _scored(row, refined, recording, process_time() - began)
+    row = _scored(row, refined, recording, process_time() - began)
+    if case.foreign:
+        return row
+    return replace(row, right_share=_right_share(refined, recording, town.network, roads))
 
 
 def _scored(row: StressRow, refined: CognitiveMap, recording: Recording, cpu_s: float) -> StressRow:
@@ -144,8 +158,31 @@ def _scored(row: StressRow, refined: CognitiveMap, recording: Recording, cpu_s: 
     return replace(
         row,
         wrong=int(np.count_nonzero(errors_m > WRONG_M)),
+        far=int(np.count_nonzero(errors_m > FAR_M)),
         ape_mean_m=float(errors_m.mean()),
         ape_max_m=float(errors_m.max()),
         rpe_20m_mean_m=relative.mean_m,
         nees=spread,
     )
+
+
+def _right_share(refined: CognitiveMap, recording: Recording, driven: RoadNetwork, roads: RoadNetwork) -> float:
+    """Of the vertices on lanes that ``roads`` has, the share that is vouched for and less than ``FAR_M`` off."""
+    samples = recording.samples
+    nearest = np.clip(np.searchsorted(samples.t_s, refined.t_s - 1e-9), 0, len(samples.t_s) - 1)
+    there = np.isin(np.array(driven.lane_ids)[samples.lane[nearest]], roads.lane_ids)
+    errors: FloatArray = ape(Trajectory(refined.t_s, refined.poses), recording.ground_truth()).errors_m
+    assert refined.road_match is not None
+    right = (refined.road_match.status == MatchStatus.MATCHED) & (errors < FAR_M)
+    return float(np.mean(right[there]))
+
+
+@lru_cache(maxsize=1)
+def _code_sha256() -> str:
+    """Of the code that rows come from."""
+    root, digest = Path(hippodrome.core.types.__file__).parent.parent, hashlib.sha256()
+    for part in ("core", "eval"):
+        for path in sorted((root / part).rglob("*.py")):
+            digest.update(path.relative_to(root).as_posix().encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from hippodrome.core.types import EdgeKind
+from hippodrome.core.types import EdgeKind, HippodromeError
 from hippodrome.eval.perturbations import with_false_closures, without_roads
+from hippodrome.eval.stress_cases import CASES, chosen_cases, in_self_similar_grid
 from hippodrome.eval.stress_table import StressRow, stress_markdown
+from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.town import build_town
 from tests.core.synthetic import grid_network, semi_metric_drive
 
 
@@ -55,3 +58,30 @@ def test_the_summary_shows_failures_and_the_worst():
     assert "| paper | 3 | 1 | 0.40 |" in text
     assert "0.60 (b, seed 2)" in text
     assert "- paper, b, seed 3: no route" in text
+
+
+def test_a_row_says_how_to_make_it_again_and_what_is_right():
+    row = StressRow(
+        "a", 4, "harsh", 200, 0.5, 0, 0.2, 0.9, 0.2, 0.1, 1.0, 0.5, None, far=1, right_share=0.9, rerun="hippodrome x"
+    )
+    refused = StressRow("a", 5, "another town", 200, failure="no vertex is vouched for", rerun="hippodrome y")
+    text = stress_markdown([row, refused])
+    assert "| 50.0 | 90.0 | 1.00 | 0 |" in text
+    assert "- another town, a, seed 5: no vertex is vouched for. `hippodrome y`" in text
+
+
+def test_cases_of_one_self_motion_share_a_map_and_unknown_names_are_refused():
+    assert len({case.self_motion().model_dump_json() for case in CASES}) == 5
+    with pytest.raises(HippodromeError, match="no stress case 'rain'"):
+        chosen_cases(["paper", "rain"])
+
+
+def test_the_self_similar_grid_is_one(tmp_path):
+    scenario = in_self_similar_grid(Scenario(name="any"), tmp_path)
+    network = build_town(scenario.town, 1, tmp_path).network
+    lengths = network.lane_lengths_m()[~network.is_internal]
+    assert lengths.max() - lengths.min() < 6.0  # corners and edges of the grid have smaller crossings
+    before = scenario.town.network.read_bytes()
+    scenario.town.network.unlink()
+    in_self_similar_grid(Scenario(name="any"), tmp_path)
+    assert scenario.town.network.read_bytes() == before  # no date in it

@@ -1,0 +1,85 @@
+"""What the refinement is stressed with: one thing that goes wrong per case."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.proto.atomic import write_atomically
+from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.self_motion import NOISE_LEVELS, NoiseLevel, SelfMotionNoise
+from hippodrome.sim.town import CONVERT_OPTIONS, TownSpec, run_tool
+
+MISSING_ROADS = 2  # driven streets taken out of the network, both directions each
+FOREIGN_SEED = 1_000_003  # added to a town's own: a town of the same kind, where the drive never was
+GRID_CROSSINGS: Final = 4  # in each direction, ..
+GRID_BLOCK_M: Final = 80.0  # .. this far apart: as large as the other towns, and every block like every other
+
+
+@dataclass(frozen=True, slots=True)
+class StressCase:
+    """One thing that goes wrong."""
+
+    name: str
+    noise: NoiseLevel = "paper"
+    false_closures: float = 0.0  # share of the map's closures, added between random vertices
+    survey_error_m: float = 0.0
+    scale_jump: float = 0.0  # standard deviation of ln(scale) at each jump
+    gyro_bias_degps: float | None = None
+    missing_roads: int = 0
+    foreign: bool = False  # the network is that of another town
+    self_similar: bool = False  # the town is a grid of equal blocks; one a seed, whatever the scenario's town
+    start_known: bool = False  # the first pose is given
+
+    def self_motion(self) -> SelfMotionNoise:
+        """The noise that the odometry is sensed with."""
+        level = NOISE_LEVELS[self.noise]
+        changed: dict[str, float] = {"scale_jump": max(self.scale_jump, level.scale_jump)}
+        if self.gyro_bias_degps is not None:
+            changed["gyro_bias_degps"] = self.gyro_bias_degps
+        return level.model_copy(update=changed)
+
+
+CASES = (
+    StressCase("paper", false_closures=0.01),
+    StressCase("no false closures"),
+    StressCase("false closures 5 %", false_closures=0.05),
+    StressCase("false closures 20 %", false_closures=0.20),
+    StressCase("survey error 0.5 m", survey_error_m=0.5),
+    StressCase("scale jumps 10 %", scale_jump=0.10),
+    StressCase("drift x 3", gyro_bias_degps=0.15),
+    StressCase("missing roads", missing_roads=MISSING_ROADS),
+    StressCase("realistic", noise="realistic"),
+    StressCase("harsh", noise="harsh"),
+    StressCase("another town", foreign=True),
+    StressCase("self-similar grid", self_similar=True),
+    StressCase("self-similar grid, start given", self_similar=True, start_known=True),
+)
+
+
+def chosen_cases(names: Sequence[str]) -> tuple[StressCase, ...]:
+    """The cases of these names, all if there are none."""
+    if unknown := set(names) - {case.name for case in CASES}:
+        raise HippodromeError(f"no stress case '{sorted(unknown)[0]}'; there are: {', '.join(case.name for case in CASES)}")
+    return tuple(case for case in CASES if not names or case.name in names)
+
+
+def in_self_similar_grid(scenario: Scenario, root: Path) -> Scenario:
+    """The scenario's drive and camera in a grid of equal blocks, whose network is made below ``root`` once."""
+    file = root / "towns" / f"self-similar-{GRID_CROSSINGS}-{GRID_BLOCK_M:g}.net.xml"
+    if not file.exists():
+        part = file.with_suffix(".part.xml")
+        part.parent.mkdir(parents=True, exist_ok=True)
+        speed_mps = scenario.town.speed_limit_mps
+        run_tool(
+            "netgenerate", "--grid", f"--grid.number={GRID_CROSSINGS}", f"--grid.length={GRID_BLOCK_M}",
+            f"--default.speed={speed_mps}", f"--output-file={part}", *CONVERT_OPTIONS,
+        )  # fmt: skip
+        without_date = re.sub(r"<!--.*?-->\s*", "", part.read_text(encoding="utf-8"), flags=re.DOTALL)
+        write_atomically(file, without_date.encode())
+        part.unlink()
+    return scenario.model_copy(update={"name": "self-similar-grid", "town": TownSpec(network=file)})

@@ -24,7 +24,8 @@ def add_sweep_command(commands: Any) -> None:
 
 def _sweep(options: argparse.Namespace) -> int:
     """Evaluate every cell of a grid; finished cells are kept, failed ones listed (exit status 1) and run by the same command."""
-    from hippodrome.eval.sweep.grid import SweepError, parse_parameter
+    from hippodrome.eval.sweep.executors import SweepError
+    from hippodrome.eval.sweep.grid import parse_parameter
     from hippodrome.eval.sweep.run import sweep
 
     try:

@@ -20,7 +20,8 @@ from hippodrome.eval.localization_score import FALSE_FIX_M
 from hippodrome.eval.materials import file_stem, score_trajectory
 from hippodrome.eval.metrics import Score
 from hippodrome.eval.results import Row, ScenarioResult
-from hippodrome.eval.sweep.grid import Cell, SweepError, code_sha256
+from hippodrome.eval.sweep.executors import SweepError
+from hippodrome.eval.sweep.grid import Cell, code_sha256
 from hippodrome.eval.trajectory_io import read_tum
 from hippodrome.sim.record import RecordingPlan, Role, close_renderer, record
 

@@ -14,12 +14,15 @@ from rich.progress import Progress
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.pool import process_pool
-from hippodrome.eval.sweep.grid import SweepError
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
 DIED = "its process died, also when it ran alone (out of memory?)"
 CONNECT_S = 10.0  # a scheduler that does not answer in this time is not there
+
+
+class SweepError(HippodromeError):
+    """A grid that cannot be made, or cells that cannot be run."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,17 +15,13 @@ import yaml
 from pydantic import ValidationError
 
 import hippodrome.core.types
-from hippodrome.core.types import HippodromeError
 from hippodrome.eval.scenario_files import read_scenario
+from hippodrome.eval.sweep.executors import SweepError
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS
 
 CODE = ("core/**/*.py", "sim/**/*.py", "proto/**/*.py", "eval/*.py", "eval/baselines/**/*.py")  # what figures come from
 MAX_CELLS = 100_000  # a slip of the keyboard, not a sweep
-
-
-class SweepError(HippodromeError):
-    """A grid that cannot be made, or cells that cannot be run."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,8 @@ from pydantic import ValidationError
 from hippodrome.eval.pool import progress_bar
 from hippodrome.eval.results import Results, to_json, write_results
 from hippodrome.eval.sweep.cell import ROLES, CellResult, CellTask, RecordingTask, make_recording, run_cell
-from hippodrome.eval.sweep.executors import Failure, Runner, dask_cluster, local_processes
-from hippodrome.eval.sweep.grid import Cell, Parameter, SweepError, code_sha256, make_grid
+from hippodrome.eval.sweep.executors import Failure, Runner, SweepError, dask_cluster, local_processes
+from hippodrome.eval.sweep.grid import Cell, Parameter, code_sha256, make_grid
 from hippodrome.eval.sweep.table import pooled_rows, sweep_markdown
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import RecordingPlan

@@ -2,7 +2,8 @@ import pytest
 
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT
-from hippodrome.eval.sweep.grid import Parameter, SweepError, make_grid, parse_parameter, with_value
+from hippodrome.eval.sweep.executors import SweepError
+from hippodrome.eval.sweep.grid import Parameter, make_grid, parse_parameter, with_value
 from hippodrome.sim.scenario import Scenario
 
 TINY = Scenario(name="tiny")

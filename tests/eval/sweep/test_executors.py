@@ -1,0 +1,43 @@
+"""A task that fails, or kills its process, fails alone. The cluster's part is in test_sweep."""
+
+import os
+import signal
+
+import pytest
+from rich.progress import Progress
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.eval.sweep.executors import DIED, Failure, Runner, SweepError, dask_cluster, local_processes
+
+
+def work(item):
+    if item == "bad":
+        raise HippodromeError("bad.yaml: no road")
+    if item == "bug":
+        raise KeyError("x")
+    if item == "killer":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return item.upper()
+
+
+def test_each_fails_alone():
+    found = {}
+    with Progress(disable=True) as progress:
+        Runner(local_processes(2), progress).run("work", work, ["a", "killer", "bad", "bug", "b"], found.__setitem__)
+    assert found == {
+        "a": "A",
+        "b": "B",
+        "bad": Failure("bad.yaml: no road"),
+        "bug": Failure("KeyError: 'x'"),
+        "killer": Failure(DIED),
+    }
+
+
+def test_a_scheduler_that_is_not_there(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("hippodrome.eval.sweep.executors.CONNECT_S", 0.2)
+    with (
+        pytest.raises(SweepError, match=r"--scheduler tcp://127\.0\.0\.1:9: no Dask scheduler answers"),
+        dask_cluster("tcp://127.0.0.1:9")(None),
+    ):
+        pass

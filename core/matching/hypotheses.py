@@ -22,7 +22,7 @@ Moment: TypeAlias = tuple[float, ...]  # of a step: heading at its end, on its w
 Rows: TypeAlias = NDArray[Any]  # of ROW
 OffRows: TypeAlias = NDArray[Any]  # of OFF
 
-NOWHERE = -1e30  # nats of what leads nowhere
+NOWHERE = -math.inf  # nats of what leads nowhere
 
 ROW = np.dtype(
     [

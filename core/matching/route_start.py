@@ -41,8 +41,10 @@ def anchors(track: Track, most: int) -> list[int]:
 
 def starts_from(field: SearchField, anchor: int, config: RouteSearchConfig) -> Seeds:
     """Hypotheses at the drive's beginning that lead to the good ones at sample ``anchor``."""
-    rows = _everywhere(field.graph, len(field.log_scale), float(field.track.heading_rad[anchor]))
-    rows["score"] = _coarse_nats(field, anchor, config)
+    nats, scales = _coarse_nats(field, anchor, config), len(field.log_scale)
+    bins = np.flatnonzero(nats.max(axis=1) > NOWHERE).astype(np.int32)
+    rows = _hypotheses(field.graph, bins, scales, float(field.track.heading_rad[anchor]))
+    rows["score"] = nats[bins].ravel()
     rows = rows[rows["score"] > NOWHERE]
     return Seeds(rows, _NO_PLACES) if anchor == 0 else _traced_back(field, anchor, rows, config)
 
@@ -50,9 +52,10 @@ def starts_from(field: SearchField, anchor: int, config: RouteSearchConfig) -> S
 def prior_starts(field: SearchField, start: StartPose, config: RouteSearchConfig) -> Seeds:
     """Hypotheses near a start pose, at every scale; one at the pose itself, should it lie off the network."""
     scales = len(field.log_scale)
-    rows = _everywhere(field.graph, scales, float(field.track.heading_rad[0]))
-    rows["score"] = np.repeat(_prior_nats(field.graph, start), scales)
-    rows = rows[rows["score"] >= rows["score"].max() - config.beam_nats]
+    prior = _prior_nats(field.graph, start)
+    near = np.flatnonzero(prior >= prior.max() - config.beam_nats).astype(np.int32)
+    rows = _hypotheses(field.graph, near, scales, float(field.track.heading_rad[0]))
+    rows["score"] = np.repeat(prior[near], scales)
     off, places = np.zeros(scales, ROW), np.zeros(scales, OFF)
     off["bin"], off["k"], off["score"] = -1 - np.arange(scales), np.arange(scales), -config.off_network.leave_nats
     off["offset"] = float(wrap(np.array(start.heading_rad - field.track.heading_rad[0])))
@@ -61,12 +64,12 @@ def prior_starts(field: SearchField, start: StartPose, config: RouteSearchConfig
     return Seeds(np.concatenate([rows, off]), places)
 
 
-def _everywhere(graph: LaneGraph, scales: int, heading_rad: float) -> Rows:
-    """Every (bin, scale bin) as a hypothesis, bin-major."""
-    rows = np.zeros(graph.bin_count * scales, ROW)
-    rows["bin"] = np.repeat(np.arange(graph.bin_count, dtype=np.int32), scales)
-    rows["k"] = np.tile(np.arange(scales, dtype=np.int32), graph.bin_count)
-    rows["offset"] = np.repeat(wrap(graph.heading_rad.astype(np.float64) - heading_rad), scales)
+def _hypotheses(graph: LaneGraph, bins: IntArray, scales: int, heading_rad: float) -> Rows:
+    """Every scale bin in each of some bins, bin-major."""
+    rows = np.zeros(len(bins) * scales, ROW)
+    rows["bin"] = np.repeat(bins, scales)
+    rows["k"] = np.tile(np.arange(scales, dtype=np.int32), len(bins))
+    rows["offset"] = np.repeat(wrap(graph.heading_rad[bins].astype(np.float64) - heading_rad), scales)
     return rows
 
 
@@ -78,7 +81,7 @@ def _prior_nats(graph: LaneGraph, start: StartPose) -> Float32Array:
 
 
 def _coarse_nats(field: SearchField, anchor: int, config: RouteSearchConfig) -> Float32Array:
-    """For each (fine bin, scale bin), how far the best route on from its coarse cell falls behind the best of all."""
+    """For each fine bin and scale bin (N, K), how far the best route on from its coarse cell falls behind the best of all."""
     many = config.coarse
     log_scale = field.log_scale[many // 2 :: many]
     step = 2.0 * field.track.step  # coarse bins need longer steps, to be moved by more than a bin
@@ -93,14 +96,15 @@ def _coarse_nats(field: SearchField, anchor: int, config: RouteSearchConfig) -> 
         bin_m=many * config.bin_m,
     )
     arguments = kernel_arguments(coarse, field.track.heading_rad[anchor::2])
-    starts = _everywhere(coarse.graph, len(log_scale), float(field.track.heading_rad[anchor]))
+    everywhere = np.arange(coarse.graph.bin_count, dtype=np.int32)
+    starts = _hypotheses(coarse.graph, everywhere, len(log_scale), float(field.track.heading_rad[anchor]))
     beam_nats, enough = config.coarse_beam_nats, config.coarse_enough
     survivors = survivors_from(arguments, Seeds(starts, _NO_PLACES), beam_nats, _MOST_STARTS, enough)
     nothing = np.zeros(survivors[0][-1] - survivors[0][-2], np.float32)
     through = route_kernel.backward(*arguments, config.seed_margin_nats, survivors, nothing)[: len(starts)]
     cell = coarse.graph.lane_start[field.graph.lane] + _share_of_lane(field.graph, coarse.graph)
     scale_cell = np.minimum(np.arange(len(field.log_scale)) // many, len(log_scale) - 1)
-    nats: Float32Array = through.reshape(coarse.graph.bin_count, len(log_scale))[cell][:, scale_cell].ravel()
+    nats: Float32Array = through.reshape(coarse.graph.bin_count, len(log_scale))[cell][:, scale_cell]
     return nats
 
 

@@ -42,7 +42,7 @@ class RouteSearchConfig:
     bin_m: float = 1.0
     step_m: float = 5.0  # if the drive's brisk speed is the network's usual limit
     scale_bin: float = 0.04  # of log scale
-    beam_nats: float = 25.0  # right routes fall at most 10 behind the best on the way; the rest is for close rivals
+    beam_nats: float = 20.0  # right routes fall at most 10 behind the best on the way; the rest is for close rivals
     most_survivors: int = 30_000  # bounds time and memory where a town is too self-similar for the beam to prune
     costs: SearchCosts = field(default_factory=SearchCosts)
     off_network: OffNetworkCosts = field(default_factory=OffNetworkCosts)
@@ -51,4 +51,4 @@ class RouteSearchConfig:
     coarse_enough: int = 1_000  # survivors at which stage 1 may stop
     seed_margin_nats: float = 20.0  # starts that score less than this below the best coarse route are searched finely
     anchors: int = 4  # beginnings tried at most, while stretches of the drive stay unexplained
-    margin_nats: float = 25.0  # alternatives up to this far behind the best route are looked for
+    margin_nats: float = 15.0  # alternatives up to this far behind the best route are looked for

@@ -31,6 +31,12 @@ def test_unknown_start_and_scale_are_found(town, drive):
     np.testing.assert_allclose(route.log_scale, np.log(2.0), atol=0.1)
 
 
+def test_alternatives_are_the_good_ones_and_the_best_is_among_them(town, drive):
+    alternatives = search_route(drive[0], town, CONFIG).alternatives
+    assert alternatives.through_nats.min() >= -CONFIG.margin_nats
+    np.testing.assert_allclose(np.maximum.reduceat(alternatives.through_nats, alternatives.row_start[:-1]), 0.0, atol=1e-2)
+
+
 def test_the_unit_of_length_does_not_matter(town, drive):
     visits, _, _ = drive
     tiny = replace(visits, motion=visits.motion * [1e-3, 1e-3, 1.0])

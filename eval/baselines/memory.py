@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -27,11 +28,16 @@ class MemoryTask:
 
 
 def with_peak_rss(results: Results, scenario: Scenario, out: Path, workers: int) -> Results:
-    """The results with the peak memory of every row that has none yet, and a figure of ours."""
+    """The results with the peak memory in the rows of our methods."""
     tasks = [MemoryTask(method, scenario, out) for method in (DEAD_RECKONING, SEMI_METRIC, RATSLAM, NO_ATTRACTOR, *dict(MODES))]
     spawn = multiprocessing.get_context("spawn")  # a fork would inherit the memory of this process
-    with ProcessPoolExecutor(workers, mp_context=spawn, max_tasks_per_child=1) as fresh:
-        found = dict(zip((task.method for task in tasks), fresh.map(peak_rss_bytes, tasks), strict=True))
+    try:
+        with ProcessPoolExecutor(workers, mp_context=spawn, max_tasks_per_child=1) as fresh:
+            found = dict(zip((task.method for task in tasks), fresh.map(peak_rss_bytes, tasks), strict=True))
+    except BrokenProcessPool:
+        raise HippodromeError(
+            "peak memory: a process died (out of memory?); run the command again with fewer --workers"
+        ) from None
     scenarios = (ScenarioResult(**{**dict(one), "rows": [_with(row, found) for row in one.rows]}) for one in results.scenarios)
     return Results(scenarios=tuple(scenarios))
 

@@ -10,7 +10,7 @@ from importlib import import_module
 
 from benchmarks.table import Row, table
 
-NAMES = ("render", "mapping", "localization")
+NAMES = ("render", "mapping", "localization", "matching", "scaling")
 
 
 def main(names: list[str]) -> int:

@@ -18,6 +18,7 @@ from hippodrome.core.matching.search_field import KernelArguments, SearchField, 
 from hippodrome.core.types import Float32Array, FloatArray, IntArray
 
 _MOST_ROWS = 8_000_000  # of a stretch: 200 MB
+_EXACT_NATS = 4000.0  # scores below this are counted from a new zero: their steps would be rounded to 0.0005 and more
 _CELL_M = 8.0  # of a lane: alternatives closer than this are one
 
 
@@ -62,6 +63,7 @@ def best_through(field: SearchField, arguments: KernelArguments, seeds: Seeds, c
             break
         seeds = last_of(survivors)
         best = seeds.rows["score"].max()
+        best = best if best < -_EXACT_NATS else np.float32(0.0)
         seeds.rows["score"] -= best
         first, taken_off = last, taken_off + float(best)
     return None

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
+from scipy.spatial import cKDTree
 
 from hippodrome.core import se2
 from hippodrome.core.gauss_newton import gauss_newton
@@ -205,9 +206,11 @@ def _edges(truth, motion, units_per_metre, closures, false_share, rng):
 
 def _revisits(truth, closures, rng):
     """Pairs (later, earlier) of vertices at one place and heading, at least 30 vertices apart."""
-    near = np.linalg.norm(truth[:, None, :2] - truth[None, :, :2], axis=2) < 3.0
-    near &= np.abs(se2.wrap(truth[:, None, 2] - truth[None, :, 2])) < 0.35
-    a, b = np.nonzero(np.tril(near, -30))
+    pairs = cKDTree(truth[:, :2]).query_pairs(3.0, output_type="ndarray")
+    b, a = np.sort(pairs, axis=1).T
+    alike = (a - b >= 30) & (np.abs(se2.wrap(truth[a, 2] - truth[b, 2])) < 0.35)
+    order = np.lexsort((b[alike], a[alike]))
+    a, b = a[alike][order], b[alike][order]
     pick = np.sort(rng.permutation(len(a))[:closures])
     return a[pick], b[pick]
 

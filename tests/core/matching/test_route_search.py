@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hippodrome.core.matching import search_passes
 from hippodrome.core.matching.route_search import search_route
 from hippodrome.core.matching.search_config import RouteSearchConfig
 from hippodrome.core.matching.track import make_track, scale_range
@@ -35,6 +36,17 @@ def test_alternatives_are_the_good_ones_and_the_best_is_among_them(town, drive):
     alternatives = search_route(drive[0], town, CONFIG).alternatives
     assert alternatives.through_nats.min() >= -CONFIG.margin_nats
     np.testing.assert_allclose(np.maximum.reduceat(alternatives.through_nats, alternatives.row_start[:-1]), 0.0, atol=1e-2)
+
+
+def test_a_drive_searched_in_stretches_gives_the_same_answer(town, drive, monkeypatch):
+    visits, poses, _ = drive
+    once = search_route(visits, town, CONFIG, StartPose(*poses[0]))
+    monkeypatch.setattr(search_passes, "_MOST_ROWS", 20_000)
+    parts = search_route(visits, town, CONFIG, StartPose(*poses[0]))
+    np.testing.assert_array_equal(parts.points_m, once.points_m)
+    np.testing.assert_array_equal(parts.score_nats, once.score_nats)
+    np.testing.assert_array_equal(parts.alternatives.row_start, once.alternatives.row_start)
+    np.testing.assert_allclose(parts.alternatives.through_nats, once.alternatives.through_nats, atol=1e-3)
 
 
 def test_the_unit_of_length_does_not_matter(town, drive):

@@ -1,7 +1,7 @@
 """The gate on figures of real runs, not on made ones.
 
 ``gate_samples.json`` holds, of short and long drives in generated and real towns, the figures of the same code
-* on two drives a dozen times, self-motion shaken in its ninth digit as another processor would, after once unshaken (``repeats``),
+* on two drives a dozen times, self-motion shaken in its ninth digit as by another processor, after once unshaken (``repeats``),
 * on other towns and seeds (``drives``).
 """
 

@@ -39,6 +39,7 @@ class EvaluationTask:
 
     scenario: Scenario
     out: Path
+    figures: bool = True  # a sweep of thousands leaves them: they take most of a short scenario's time
 
 
 def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
@@ -83,7 +84,8 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
     scored |= {method: topometric.scored for method, topometric in found.items()}
     _write_evidence(materials, scored, found)
     write_map_evidence(materials, scored, found)
-    draw_scenario(materials, semi_metric, scored, found)
+    if task.figures:
+        draw_scenario(materials, semi_metric, scored, found)
     return _result(materials, rows, mapping_s, found)
 
 

@@ -95,7 +95,7 @@ def run_cell(task: CellTask) -> CellResult:
         if not (folder / name).exists():
             (folder / name).symlink_to(Path("..", "..", name))
     with _one_at_a_time:
-        result = evaluate_scenario(EvaluationTask(task.cell.scenario, folder))
+        result = evaluate_scenario(EvaluationTask(task.cell.scenario, folder, figures=False))
     evidence = folder / task.cell.scenario.name
     samples = {row.method: found for row in result.rows if (found := _samples(row, evidence))}
     return CellResult(parameters=dict(task.cell.parameters), result=result, samples=samples)

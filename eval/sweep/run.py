@@ -62,8 +62,8 @@ def sweep(
 
 def _recordings(cells: Sequence[Cell], out: Path) -> list[RecordingTask]:
     """Each drive once, however many cells it serves."""
-    plans = {RecordingPlan(_driven(cell), role, out) for cell in cells for role in ROLES}
-    return [RecordingTask(plan, code_sha256()) for plan in sorted(plans, key=lambda plan: (plan.scenario.name, plan.seed))]
+    plans = dict.fromkeys(RecordingPlan(_driven(cell), role, out) for cell in cells for role in ROLES)
+    return [RecordingTask(plan, code_sha256()) for plan in plans]
 
 
 def _driven(cell: Cell) -> Any:

@@ -44,7 +44,7 @@ MEANINGS: Final[dict[str, str]] = {
     "PaperMatchConfig.first_beta_m": "beta of Eq. (9) before it is estimated",
     "PaperRefineConfig.max_iterations": "Gauss-Newton steps a round",
     "PaperRefineConfig.growth_rounds": "of match and optimise at each growth",
-    "LocalizerConfig.mode": "default: attractors with hand-back; paper: as printed; kalman, lanes: yardsticks on equal injections",
+    "LocalizerConfig.mode": "default: attractors with hand-back; paper: as printed; kalman, lanes: yardsticks, same injections",
     "InjectionNoise.heading_rad": "sigma of the heading that a reactivated view tells",
     "PaperNetworks.period_m": "of the single grid module",
     "SelfMotionNoise.units_per_metre": "median over drives of the monocular scale",

@@ -36,6 +36,7 @@ from hippodrome.core.types import (
     Observation,
 )
 from hippodrome.core.view_search import Found
+from hippodrome.core.visual_odometry import VisualOdometry
 
 __all__ = ["Localizer", "LocalizerConfig", "localize"]
 
@@ -65,6 +66,7 @@ class Localizer:
         self._recogniser = PlaceRecogniser(self._places, config)
         self._view_step = view_step.start()
         self._gyro = GyroNoise()
+        self._odometry = VisualOdometry(config.camera) if config.self_motion == "visual" else None
         self._step_m, self._turned_rad = 0.0, 0.0  # since the last look
         self._fixed = False  # an incumbent has been adopted
         self._evidence = 0.0  # modes "paper" and "lanes": summed margins so far
@@ -77,6 +79,7 @@ class Localizer:
 
     def step(self, observation: Observation) -> LocalizationEstimate:
         """Take one observation in."""
+        observation = observation if self._odometry is None else self._odometry.step(observation)
         self._move(observation)
         if observation.frame is not None and (self._cell < 0 or view_step.is_due(self._view_step, self._config.steps)):
             self._look(observation.frame)
@@ -188,7 +191,8 @@ def _sigma_m(covariance: FloatArray) -> float:
 
 def _unknown(cognitive_map: CognitiveMap, network: RoadNetwork | None, config: LocalizerConfig) -> PoseBelief:
     """Belief before the first observation: anywhere in the map, self-motion scaled as in the mapping drive."""
-    log_scale = 0.0 if cognitive_map.log_scale is None else float(np.median(cognitive_map.log_scale))
+    wheel = config.self_motion == "wheel"  # of the same unit in both drives; visual odometry has the camera's height for unit, m
+    log_scale = float(np.median(cognitive_map.log_scale)) if wheel and cognitive_map.log_scale is not None else 0.0
     centre_m = np.mean(cognitive_map.poses[:, :2], axis=0)
     if config.mode == "paper":
         return PaperPose.uniform(centre_m, log_scale, config)

@@ -12,6 +12,7 @@ from hippodrome.core.types import FloatArray
 from hippodrome.core.view_cells import ViewCellConfig
 from hippodrome.core.view_search import SearchConfig
 from hippodrome.core.view_step import ViewStepConfig
+from hippodrome.core.visual_odometry import CameraGeometry
 
 Mode: TypeAlias = Literal["default", "paper", "kalman", "lanes"]
 
@@ -27,6 +28,11 @@ class MotionNoise:
     gyro_gain: float = 0.01  # share of the turned angle
     scale_prior: float = 0.3  # sigma of ln(metres per unit) of this drive about the map's: two drives' spreads of 0.2
     scale_walk_per_sqrt_m: float = 0.004  # ln(scale) wanders 4 % in 100 m
+
+
+VISUAL_NOISE = MotionNoise(  # of self-motion from the frames: 5 % per 50 m and 1 deg at its best, and turns that it loses
+    speed=0.1, gyro_rad_per_sqrt_s=0.005, gyro_gain=0.15, scale_walk_per_sqrt_m=0.012
+)
 
 
 @dataclass(frozen=True)
@@ -67,6 +73,8 @@ class LocalizerConfig:
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
     mode: Mode = "default"
+    self_motion: Literal["wheel", "visual"] = "wheel"  # visual: from the frames alone, the observations' own is not looked at
+    camera: CameraGeometry = field(default_factory=CameraGeometry)  # for self_motion "visual"
     views: ViewCellConfig = field(default_factory=ViewCellConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
     steps: ViewStepConfig = field(default_factory=lambda: ViewStepConfig(interval_s=0.4))  # denser than the map: 15 % less error

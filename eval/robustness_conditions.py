@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
+from hippodrome.core.localizer_config import VISUAL_NOISE
 from hippodrome.core.types import HippodromeError
+from hippodrome.core.visual_odometry import CameraGeometry
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.traffic import TrafficSpec
 
@@ -65,6 +68,14 @@ def _self_motion(level: str) -> Change:
     return lambda scenario: _seen()(scenario).model_copy(update={"noise": level})
 
 
+def _visual(scenario: Scenario) -> Scenario:
+    """Self-motion from the frames alone."""
+    same, camera = _seen()(scenario), scenario.camera
+    geometry = CameraGeometry(camera.fov_deg, camera.height_m, camera.forward_m)
+    localizer = replace(same.localizer, self_motion="visual", camera=geometry, motion=VISUAL_NOISE)
+    return same.model_copy(update={"localizer": localizer})
+
+
 CONDITIONS: Final[dict[str, Change]] = {
     SAME: _seen(),
     "sun-opposite": _sun_opposite,
@@ -83,6 +94,7 @@ CONDITIONS: Final[dict[str, Change]] = {
     "self-motion-clean": _self_motion("clean"),
     "self-motion-realistic": _self_motion("realistic"),
     "self-motion-harsh": _self_motion("harsh"),
+    "self-motion-visual": _visual,
 }
 
 

@@ -66,6 +66,12 @@ def test_a_condition_changes_what_its_name_says_and_nothing_else(name, fields):
     assert sorted(differences(changed(SAME), changed(name))) == sorted(fields)
 
 
+def test_visual_self_motion_changes_the_localizer_alone():
+    found = differences(changed(SAME), changed("self-motion-visual"))
+    assert "localizer.self_motion" in found
+    assert all(name.startswith(("localizer.self_motion", "localizer.motion.")) for name in found)
+
+
 def test_every_condition_differs_from_same_and_is_a_valid_scenario():
     for name in CONDITIONS:
         assert name == SAME or differences(changed(SAME), changed(name))
@@ -155,7 +161,9 @@ def test_targets_are_reached_held_or_missed():
 
 
 def test_a_false_fix_in_another_town_counts():
-    found = findings(ConditionResult("same", (sequence(),)), ConditionResult(ELSEWHERE, (sequence(None, (), false_fixes=1, nees=None),)))
+    found = findings(
+        ConditionResult("same", (sequence(),)), ConditionResult(ELSEWHERE, (sequence(None, (), false_fixes=1, nees=None),))
+    )
     false = next(target for target in found.targets() if "false fix" in target.item)
     assert (false.value, false.verdict) == (50.0, "MISSED")
     assert [result.name for result in found.conditions] == ["same"]

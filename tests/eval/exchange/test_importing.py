@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from hippodrome.core import se2
 from hippodrome.core.types import Trajectory
@@ -191,3 +192,41 @@ def test_the_manifest_says_what_it_was(exported, tmp_path):
     assert manifest["imported"]["format"] == "euroc"
     assert manifest["camera"]["fov_deg"] == pytest.approx(80.0)
     assert manifest["truth_frame"] == "own"
+
+
+def test_epoch_clocks_and_camera_axes(run, foreign, tmp_path):
+    """As most datasets come: seconds since 1970, poses of the camera, z forward."""
+    epoch_s = 1_403_636_579.0
+    rows = [line.split() for line in (foreign / "rgb.txt").read_text().splitlines()[1:]]
+    (foreign / "rgb.txt").write_text("".join(f"{float(t) + epoch_s:.6f} {name}\n" for t, name in rows))
+    truth, optical = run.mapping.ground_truth(), Rotation.from_matrix([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    lines = [
+        f"{t_s + epoch_s:.6f} {x} {y} 0.3 " + " ".join(map(str, (Rotation.from_euler("z", yaw) * optical).as_quat()))
+        for t_s, (x, y, yaw) in zip(truth.t_s, truth.poses, strict=True)
+    ]
+    (foreign / "groundtruth.txt").write_text("\n".join(lines))
+    assert imported(foreign, "tum", tmp_path / "in", "--axes", "camera", "--odometry", "truth") == DONE
+    back = open_recording(tmp_path / "in")
+    assert back.manifest["imported"]["time_origin_s"] == pytest.approx(epoch_s + 0.1, abs=1e-4)
+    assert np.abs(back.samples.poses_m - truth.poses[1:]).max() < 1e-6
+    turned = se2.wrap(np.diff(truth.poses[:, 2]))
+    assert np.allclose(back.samples.yaw_rate_radps * back.samples.dt_s, turned, atol=1e-5)
+    assert back.frame_count == 30
+
+
+@pytest.mark.parametrize("to", ["tum", "euroc", "kitti", "mcap", "rerun", "rosbag2"])
+def test_a_drive_without_truth_and_calibration_is_exported_too(run, foreign, tmp_path, to):
+    write_tum(tmp_path / "vo.tum", run.mapping.ground_truth())
+    (foreign / "groundtruth.txt").unlink()
+    assert imported(foreign, "tum", tmp_path / "in", "--odometry", tmp_path / "vo.tum") == DONE
+    assert main(["export", str(tmp_path / "in"), "--to", to, "--out", str(tmp_path / "out")]) == DONE
+    (drive,) = json.loads((tmp_path / "out" / "about.json").read_text())["drives"]
+    assert (drive["truth"], drive["roads"], drive["frames"]) == (False, False, 30)
+
+
+def test_evo_results_need_a_truth(run, foreign, tmp_path, capsys):
+    write_tum(tmp_path / "vo.tum", run.mapping.ground_truth())
+    (foreign / "groundtruth.txt").unlink()
+    assert imported(foreign, "tum", tmp_path / "in", "--odometry", tmp_path / "vo.tum") == DONE
+    assert main(["export", str(tmp_path / "in"), "--to", "evo", "--out", str(tmp_path / "out")]) == BAD_INPUT
+    assert "no drive has a truth" in capsys.readouterr().err

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from hippodrome.eval.commands.arguments import DONE
 
 EXPORTS = ("tum", "kitti", "euroc", "mcap", "rerun", "evo", "rosbag2")
-IMPORTS = ("tum", "kitti", "euroc", "mcap")
+IMPORTS = ("tum", "kitti", "euroc", "mcap", "rosbag")
 
 
 def add_exchange_commands(commands: Any) -> None:
@@ -22,7 +22,7 @@ def add_exchange_commands(commands: Any) -> None:
     out.set_defaults(command=_export)
 
     into = commands.add_parser("import", help="a foreign drive as a recording", description=_import.__doc__)
-    into.add_argument("source", type=Path, metavar="SOURCE", help="the sequence's folder, or an .mcap file")
+    into.add_argument("source", type=Path, metavar="SOURCE", help="the sequence's folder, an .mcap file, or a ROS bag")
     into.add_argument("--from", required=True, choices=IMPORTS, dest="kind")
     into.add_argument("--odometry", metavar="FILE", help="self-motion: .csv of t_s,speed,yaw_rate; .tum of poses; or 'truth'")
     into.add_argument("--truth", type=Path, metavar="FILE.tum", help="poses to score with, instead of the layout's own")

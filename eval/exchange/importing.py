@@ -36,6 +36,7 @@ READERS: Final = {
     "kitti": ("tables", "read_kitti_sequence"),
     "euroc": ("tables", "read_euroc_folder"),
     "mcap": ("mcap_file", "read_mcap"),
+    "rosbag": ("rosbag", "read_rosbag"),
 }
 SAME_TIME_S = 1e-4  # a frame and a row of self-motion closer than this are of one instant: stamps are rounded
 FROM_TRUTH = "truth"  # --odometry truth

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from google.protobuf.message import DecodeError
 from mcap.exceptions import McapError
@@ -17,11 +16,11 @@ from mcap_protobuf.decoder import DecoderFactory
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.exchange.foreign import ForeignDrive, ForeignFrame, Motion, motion_table, trajectory_of
 from hippodrome.eval.exchange.poses import Axes
+from hippodrome.eval.exchange.readers.raw_image import png_of
 from hippodrome.eval.exchange.source import ExchangeError
 
 IMAGES = ("foxglove.CompressedImage", "foxglove.RawImage")
 ODOMETRY, POSE = "foxglove.Odometry", "foxglove.PoseInFrame"
-CHANNELS = {"rgb8": None, "bgr8": None, "mono8": cv2.COLOR_GRAY2BGR}  # encodings of RawImage
 TRUTH_TOPICS = ("/ground_truth", "/groundtruth", "/gt_pose")
 
 
@@ -66,22 +65,11 @@ def _messages(stream: Any, topic: str) -> Iterator[tuple[int, Any]]:
 
 
 def _frame(path: Path, topic: str, stamp: int, message: Any) -> ForeignFrame:
-    blob = message.data if hasattr(message, "format") else _encoded(message, f"{path}: {topic}")
-    return ForeignFrame(stamp / 1e9, f"{path}: {topic} at {stamp} ns", lambda: bytes(blob))
-
-
-def _encoded(message: Any, where: str) -> bytes:
-    """A raw image as PNG: what comes after needs no second way."""
-    if message.encoding not in CHANNELS:
-        raise ExchangeError(f"{where}: encoding '{message.encoding}', known are {', '.join(CHANNELS)}")
-    channels = 1 if message.encoding == "mono8" else 3
-    if len(message.data) < message.step * message.height or message.step < channels * message.width:
-        raise ExchangeError(f"{where}: an image of {len(message.data)} bytes does not hold {message.width} x {message.height}")
-    rows = np.frombuffer(message.data, np.uint8, message.step * message.height).reshape(message.height, message.step)
-    image = rows[:, : channels * message.width].reshape(message.height, message.width, channels)
-    if message.encoding == "rgb8":
-        image = image[:, :, ::-1]
-    return cv2.imencode(".png", image)[1].tobytes()
+    name = f"{path}: {topic} at {stamp} ns"
+    if hasattr(message, "format"):
+        return ForeignFrame(stamp / 1e9, name, lambda: bytes(message.data))
+    png = png_of(message.data, message.encoding, message.width, message.height, message.step, name)
+    return ForeignFrame(stamp / 1e9, name, lambda: png)
 
 
 def _motion(path: Path, topic: str, messages: list[tuple[int, Any]]) -> Motion:

@@ -14,9 +14,10 @@ from hippodrome.core import se2
 from hippodrome.core.types import Trajectory
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
-from hippodrome.eval.exchange.foreign import Motion, motion_of, truth_at
+from hippodrome.eval.exchange.foreign import ForeignFrame, Motion, decode, motion_of, truth_at
 from hippodrome.eval.exchange.importing import _samples
-from hippodrome.eval.exchange.source import truth_of
+from hippodrome.eval.exchange.readers.raw_image import png_of
+from hippodrome.eval.exchange.source import ExchangeError, truth_of
 from hippodrome.eval.trajectory_io import read_tum, write_tum
 from hippodrome.sim.recording import open_recording
 
@@ -25,6 +26,7 @@ SOURCES = {
     "euroc": "hamlet-mapping",
     "kitti": "sequences/00",
     "mcap": "hamlet-mapping.mcap",
+    "rosbag": "hamlet-mapping",
 }
 
 
@@ -34,9 +36,14 @@ def imported(source, kind, out, *options):
 
 @pytest.mark.parametrize("kind", SOURCES)
 def test_our_export_comes_back(run, exported, tmp_path, kind):
-    if kind == "mcap":
+    if kind in ("mcap", "rosbag"):
         pytest.importorskip("mcap")
-    assert imported(exported(kind) / SOURCES[kind], kind, tmp_path / "in", "--truth-frame", "network") == DONE
+    assert (
+        imported(
+            exported("rosbag2" if kind == "rosbag" else kind) / SOURCES[kind], kind, tmp_path / "in", "--truth-frame", "network"
+        )
+        == DONE
+    )
     back, ours = open_recording(tmp_path / "in"), run.mapping
     assert back.frame_count == ours.frame_count
     assert all(np.array_equal(back.frame(i), ours.frame(i)) for i in range(30))
@@ -230,3 +237,41 @@ def test_evo_results_need_a_truth(run, foreign, tmp_path, capsys):
     assert imported(foreign, "tum", tmp_path / "in", "--odometry", tmp_path / "vo.tum") == DONE
     assert main(["export", str(tmp_path / "in"), "--to", "evo", "--out", str(tmp_path / "out")]) == BAD_INPUT
     assert "no drive has a truth" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("encoding", ["rgb8", "bgr8", "mono8"])
+def test_raw_images_with_padded_rows(encoding):
+    image = np.random.default_rng(1).integers(0, 256, (16, 20, 1 if encoding == "mono8" else 3), dtype=np.uint8)
+    rows = np.zeros((16, 64), np.uint8)
+    rows[:, : image[0].size] = image.reshape(16, -1)
+    found = decode(ForeignFrame(0.0, "test", lambda: png_of(rows.tobytes(), encoding, 20, 16, 64, "test")))
+    expected = image[:, :, ::-1] if encoding == "bgr8" else np.broadcast_to(image, (16, 20, 3))
+    assert np.array_equal(found, expected)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "width", "step", "complaint"),
+    [
+        ("bayer", 20, 60, "encoding 'bayer'"),
+        ("rgb8", 20, 59, "do not hold"),
+        ("rgb8", 2**30, 2**32, "do not hold"),
+        ("mono8", 0, 9, "do not"),
+    ],
+)
+def test_raw_images_that_lie_about_their_size(encoding, width, step, complaint):
+    with pytest.raises(ExchangeError, match=complaint):
+        png_of(bytes(100), encoding, width, 16, step, "bag: /image at 5 ns")
+
+
+@pytest.mark.parametrize("name", ["metadata.yaml", "hamlet-mapping.mcap"])
+@pytest.mark.parametrize("content", [None, b"", b"{"])
+def test_a_broken_bag(exported, tmp_path, capsys, name, content):
+    pytest.importorskip("mcap")
+    bag = tmp_path / "bag"
+    shutil.copytree(exported("rosbag2") / "hamlet-mapping", bag)
+    (bag / name).unlink()
+    if content is not None:
+        (bag / name).write_bytes(content)
+    assert imported(bag, "rosbag", tmp_path / "in") == BAD_INPUT
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "not a readable ROS bag" in line

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,7 +15,7 @@ from hippodrome.core.types import CognitiveMap, HippodromeError, StartPose, Traj
 from hippodrome.eval.baselines.rivals import NO_ATTRACTOR, Rival, rivals
 from hippodrome.eval.localization_score import score_localization
 from hippodrome.eval.map_quality import closures, matched_lane_accuracy, matched_lane_ids, score_closures
-from hippodrome.eval.materials import Materials, Scored, Topometric, file_stem, gather, score_trajectory
+from hippodrome.eval.materials import Materials, Scored, Topometric, file_stem, gather, refine_config, score_trajectory
 from hippodrome.eval.metrics import ape
 from hippodrome.eval.report_evidence import write_map_evidence
 from hippodrome.eval.results import Network, Row, ScenarioResult, summarize, summarize_localization
@@ -93,7 +93,7 @@ def _topometric(method: str, mode: Literal["paper", "default"], semi_metric: Cog
     """One refinement mode, and localization in its map. Mode ``paper`` is told where the drive began, as the paper's was."""
     scenario, truth = materials.scenario, materials.mapping.ground_truth()
     start = StartPose(*(float(value) for value in truth.poses[0])) if mode == "paper" else None
-    refinement, cpu_s = refine_map(semi_metric, materials.roads, replace(scenario.refine, mode=mode), start)
+    refinement, cpu_s = refine_map(semi_metric, materials.roads, refine_config(scenario, mode), start)
     refined = refinement.cognitive_map
     map_bytes = save_map(materials.folder / f"topometric-{mode}.pbstream", refined, _provenance(materials, method))
     localization = localize_recording(materials.drive.observations(), refined, materials.roads, scenario.localizer)

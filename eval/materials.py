@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
+from hippodrome.core.refine import RefineConfig
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import Refinement, Trajectory
 from hippodrome.eval.align import AlignmentName
@@ -47,6 +49,19 @@ def gather(scenario: Scenario, out: Path) -> Materials:
     folder = out / scenario.name
     folder.mkdir(parents=True, exist_ok=True)
     return Materials(scenario, folder, town, roads, finish(mapping), finish(drive))
+
+
+def refine_config(scenario: Scenario, mode: Literal["default", "paper"], survey_error_m: float | None = None) -> RefineConfig:
+    """The scenario's refinement in one mode, told how accurate the road network is: surveyors state that, no drive can show it.
+
+    ``survey_error_m``: of the network that is given, where it is not the scenario's own. A value set in the scenario stands.
+    """
+    config = scenario.refine
+    if survey_error_m is None:
+        survey_error_m = scenario.self_motion_noise.survey_error_m
+    solver = config.default.solver
+    stated = replace(solver, survey_sigma_m=solver.survey_sigma_m or survey_error_m)
+    return replace(config, mode=mode, default=replace(config.default, solver=stated))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,6 +12,7 @@ from hippodrome.core.localizer_config import LocalizerConfig, Mode
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
 from hippodrome.eval.localization_score import FALSE_FIX_M, LocalizationScore, score_localization
+from hippodrome.eval.materials import refine_config
 from hippodrome.eval.metrics import path_length_m
 from hippodrome.eval.place_recognition import half_known, looks_of, recognise
 from hippodrome.eval.pool import worker_pool
@@ -104,9 +105,8 @@ def _build_map(task: tuple[Scenario, Path]) -> None:
     scenario, out = task
     recording = finish(RecordingPlan(scenario, "mapping", out))
     semi_metric, _ = map_recording(recording.observations(), scenario.mapper)
-    config = replace(scenario.refine, mode="default")
-    refinement, _ = refine_map(semi_metric, _roads(scenario, out), config, None)
-    save_map(map_path(scenario, out), refinement.cognitive_map, {"scenario": scenario.name, "recording": recording.folder.name})
+    refined, _ = refine_map(semi_metric, _roads(scenario, out), refine_config(scenario, "default"), None)
+    save_map(map_path(scenario, out), refined.cognitive_map, {"scenario": scenario.name, "recording": recording.folder.name})
 
 
 def _roads(scenario: Scenario, out: Path) -> RoadNetwork:

@@ -24,7 +24,7 @@ from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, MatchStatus, StartPose, Trajectory
 from hippodrome.eval.calibration import nees, pose_errors
 from hippodrome.eval.figures.stress import draw_stress
-from hippodrome.eval.materials import RPE_DELTA_M
+from hippodrome.eval.materials import RPE_DELTA_M, refine_config
 from hippodrome.eval.metrics import ape, rpe
 from hippodrome.eval.perturbations import driven_streets, with_false_closures, without_roads
 from hippodrome.eval.pool import worker_pool
@@ -128,13 +128,14 @@ def _run_case(case: StressCase, task: StressTask, maps: dict[str, CognitiveMap])
     if case.foreign:  # an imported town, too, is answered with a generated one
         elsewhere = scenario.town.model_copy(update={"network": None})
         roads = build_town(elsewhere, scenario.seed + FOREIGN_SEED, task.out / "towns").network
-    roads = with_survey_error(roads, max(case.survey_error_m, NOISE_LEVELS[case.noise].survey_error_m), rng)
+    survey_error_m = max(case.survey_error_m, NOISE_LEVELS[case.noise].survey_error_m)
+    roads = with_survey_error(roads, survey_error_m, rng)
     roads = without_roads(roads, driven_streets(recording, town.network, case.missing_roads, rng))
     start = StartPose(*(float(value) for value in recording.ground_truth().poses[0])) if case.start_known else None
     row = StressRow(scenario.name, scenario.seed, case.name, len(semi_metric.t_s), rerun=task.rerun(case))
     began = process_time()
     try:
-        refined = refine(semi_metric, roads, replace(scenario.refine, mode="default"), start).cognitive_map
+        refined = refine(semi_metric, roads, refine_config(scenario, "default", survey_error_m), start).cognitive_map
     except HippodromeError as error:
         return replace(row, failure=str(error), cpu_s=process_time() - began)
     row = _scored(row, refined, recording, process_time() - began)

@@ -26,7 +26,7 @@ examples:
   hippodrome refine out/grid/semi.pbstream --network out/grid/towns/*.net.xml --out out/grid/topo.pbstream
   hippodrome localize out/grid/topo.pbstream out/grid/recordings/grid-localization-* --out out/grid/drive.tum
 
-exit status: 0 done, 1 a threshold of the scenario failed, 2 bad input (nothing is overwritten), 130 interrupted (rerun to resume)
+exit status: 0 done, 1 a threshold or a cell failed, 2 bad input (nothing is overwritten), 130 interrupted (rerun to resume)
 """
 
 

@@ -16,11 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from hippodrome.core.mapper import Mapper, MapperConfig
-from hippodrome.core.mapper_attractor import NeuralPose
-from hippodrome.core.place_memory import Recognition
+from hippodrome.core.mapper import MapperConfig
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import AttractorStates, CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
+from hippodrome.eval.baselines.ablation import MapperWithoutAttractor
 from hippodrome.eval.baselines.ratslam.system import RatSlam, RatSlamConfig, RatSlamMap
 from hippodrome.eval.materials import Materials, Scored, file_stem, score_trajectory
 from hippodrome.eval.stages import built
@@ -38,19 +37,6 @@ class Rival:
     method: str
     scored: Scored | None
     fields: dict[str, Any]
-
-
-class MapperWithoutAttractor(Mapper):
-    """The mapper whose head-direction and grid cells are left out."""
-
-    def _integrate_paths(self, observation: Observation) -> None:
-        pass
-
-    def _reactivate(self, recognitions: list[Recognition]) -> None:
-        pass
-
-    def _reckoned_states(self) -> list[NeuralPose]:
-        return []
 
 
 def rivals(materials: Materials, at_s: FloatArray) -> list[Rival]:

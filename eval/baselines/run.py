@@ -52,14 +52,14 @@ def run_baselines(options: BaselineOptions) -> None:
         for row in tracked.rows:
             _say(row)
         if whole:
-            _complete(scenario, out, tracked, pool, options.workers)
+            _complete(scenario, out, tracked, pool)
 
 
-def _complete(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers, workers: int) -> None:
+def _complete(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> None:
     """Both tables, the figures with all methods in them, and the report."""
     materials = gather(scenario, out)
     results = _joined(read_results(out / RESULTS), tracked.rows)
-    results = with_peak_rss(results, scenario, out, workers)
+    results = with_peak_rss(results, scenario, out, pool)
     found: list[Located] = [*table_two(materials), *locate(scenario, out, tracked, pool)]
     write_results(out / RESULTS, results)
     write_atomically(out / "table1.md", table_one_markdown(results, quoted_rows()).encode())

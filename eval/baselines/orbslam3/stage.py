@@ -103,10 +103,10 @@ def _prepared(scenario: Scenario, out: Path, seconds: float | None, pool: Worker
     """The pairs of both drives, or those of the first ``seconds`` of the mapping drive alone, and the vocabulary."""
     stereo = stereo_scenario(scenario)
     mapping, *others = [RecordingPlan(stereo, role, out) for role in (ROLES if seconds is None else ("mapping",))]
-    pool.run("simulate", prepare, [mapping, *others])
     frames = None if seconds is None else ceil(seconds * stereo.camera.rate_hz)
     if frames is not None and frames < 2:
         raise HippodromeError(f"--seconds {seconds:g}: fewer than two frames, give a longer time")
+    pool.run("simulate", prepare, [mapping, *others])
     drive = stereo_drive(mapping, frames)
     words = VocabularyTask(stereo.camera, scenario.seed, out)
     tasks: list[VocabularyTask | tuple[RecordingPlan, int]] = [words, *((mapping, chunk) for chunk in missing_chunks(drive))]

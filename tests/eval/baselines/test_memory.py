@@ -1,51 +1,49 @@
-"""Peak memory is that of a process that runs the method and nothing else; a method that failed has none."""
+"""Peak memory is that of a process that runs the method and no simulator; a method that failed has none."""
 
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from hippodrome.core.types import HippodromeError, Trajectory
+from hippodrome.core.types import Observation, Trajectory
 from hippodrome.eval.baselines import memory
 from hippodrome.eval.baselines.memory import MemoryTask, peak_rss_bytes
 from hippodrome.sim.scenario import Scenario
 
-RUN = {
-    "dead reckoning": ["dead_reckoning"],
-    "RatSLAM": ["run_ratslam"],
-    "semi-metric": ["map_recording"],
-    "semi-metric, no attractor": ["map_without_attractor"],
-    "topometric (paper)": ["map_recording", "refine_map"],
-    "topometric": ["map_recording", "refine_map"],
-}
+STEPS = 60
 
 
-def task(method):
-    return MemoryTask(method, Scenario(name="town"), Path("nowhere"))
-
-
-@pytest.mark.parametrize("method", RUN)
-def test_the_method_is_run_and_nothing_else(method, monkeypatch):
-    ran = []
-
-    def noting(name):
-        return lambda *arguments: (ran.append(name), 0.0)
-
-    for name in {name for names in RUN.values() for name in names}:
-        monkeypatch.setattr(memory, name, noting(name))
-    truth = Trajectory([0.0], [[1.0, 2.0, 3.0]])
-    mapping = SimpleNamespace(self_motion=lambda: [], observations=lambda: [], ground_truth=lambda: truth)
+@pytest.fixture(autouse=True)
+def drive(monkeypatch):
+    """Half a minute through frames of noise, without a road network."""
+    rng = np.random.default_rng(0)
+    frames = rng.integers(0, 256, (STEPS, 120, 160, 3), dtype=np.uint8)
+    seen = [Observation(0.5 * (i + 1), 0.5, 5.0, 0.0, frame) for i, frame in enumerate(frames)]
+    truth = Trajectory(np.zeros(1), np.array([[1.0, 2.0, 3.0]]))
+    mapping = SimpleNamespace(observations=lambda: seen, ground_truth=lambda: truth)
     materials = SimpleNamespace(mapping=mapping, roads=None, scenario=Scenario(name="town"))
     monkeypatch.setattr(memory, "gather", lambda scenario, out: materials)
-    peak = peak_rss_bytes(task(method))
-    assert ran == RUN[method]
-    resident_pages = int(Path("/proc/self/statm").read_text().split()[1])
-    assert peak >= 4096 * resident_pages * 0.9
 
 
-def test_a_method_that_failed_has_no_figure(monkeypatch):
-    def gather(scenario, out):
-        raise HippodromeError("no map")
+def peak(method):
+    return peak_rss_bytes(MemoryTask(method, Scenario(name="town"), Path("nowhere")))
 
-    monkeypatch.setattr(memory, "gather", gather)
-    assert peak_rss_bytes(task("semi-metric")) is None
+
+def test_a_method_s_process_holds_the_method_and_not_us():
+    own = 1024 * int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0])
+    assert 50 << 20 < peak("semi-metric, no attractor") < own
+
+
+def test_a_method_that_failed_has_no_figure():
+    assert peak("topometric (paper)") is None
+
+
+def test_each_method_has_a_job_of_its_own():
+    materials = memory.gather(None, None)
+    jobs = {name: memory._job(name, materials) for name in ("semi-metric", "RatSLAM", "topometric (paper)", "topometric")}
+    assert [job.kind for job in jobs.values()] == ["mapper", "RatSLAM", "mapper", "mapper"]
+    assert jobs["semi-metric"].refine is None
+    assert jobs["topometric (paper)"].refine[1].mode == "paper"
+    assert jobs["topometric (paper)"].refine[2].x_m == 1.0
+    assert (jobs["topometric"].refine[1].mode, jobs["topometric"].refine[2]) == ("default", None)

@@ -31,7 +31,7 @@ def scenario(tmp_path, monkeypatch):
     monkeypatch.setattr(run, "evaluate", evaluate)
     monkeypatch.setattr(stage, "ensure_environment", ensure_environment)
     monkeypatch.setattr(run, "gather", lambda scenario, out: None)
-    monkeypatch.setattr(run, "with_peak_rss", lambda results, scenario, out, workers: results)
+    monkeypatch.setattr(run, "with_peak_rss", lambda results, scenario, out, pool: results)
     monkeypatch.setattr(run, "table_two", lambda materials: [])
     path = tmp_path / "hamlet.yaml"
     path.write_text(SCENARIO)

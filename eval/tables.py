@@ -61,6 +61,12 @@ def _localization(row: Row, figure: Callable[..., str], field: str) -> str:
     return NONE if row.localization is None else figure(getattr(row.localization, field))
 
 
+def _runs(row: Row) -> str:
+    """Lowest and highest mean of a method that is not deterministic."""
+    spread = (row.model_extra or {}).get("ape_spread_m")
+    return " to ".join(_figure(float(value)) for value in spread) if spread else NONE
+
+
 def _success(row: Row) -> str:
     if row.localization is None or row.localization.success is None:
         return NONE
@@ -78,6 +84,7 @@ MAPPING_COLUMNS = (
     Column("Edges", lambda row: _count(row.edges)),
     Column("APE (m)", lambda row: _mean(row.ape)),
     Column("APE median / p95 / max", lambda row: _spread(row.ape)),
+    Column("APE of the runs", _runs),
     Column("RPE (m)", lambda row: _mean(row.rpe)),
     Column("RPE 20 m (m)", lambda row: _mean(row.rpe_20m)),
     Column("APE Sim(2) (m)", lambda row: _mean(row.ape_sim2)),

@@ -7,6 +7,7 @@ from hippodrome.eval.baselines.orbslam3.rows import FINAL
 from hippodrome.eval.baselines.ratios import OURS, ratios
 from hippodrome.eval.baselines.sequences import SequenceRow
 from hippodrome.eval.results import ErrorSummary, LocalizationSummary, Row
+from hippodrome.eval.tables import MAPPING_COLUMNS, row_cells
 
 
 def theirs(mean_m=0.3, tracked_share=1.0, **fields):
@@ -49,3 +50,9 @@ def test_no_ratio_to_a_tracker_that_did_not_do_its_work(row, cause):
 def test_a_method_of_ours_that_failed_has_no_ratio():
     found = ratios([theirs(), Row(method=OURS[0], failure="no route")], [])
     assert found == {OURS[0]: {"not quoted": "no route"}, OURS[1]: {"not quoted": "no row"}}
+
+
+def test_the_spread_of_the_runs_is_in_the_table():
+    columns = [column for column in MAPPING_COLUMNS if column.title == "APE of the runs"]
+    assert row_cells(columns, theirs(ape_spread_m=[0.312, 0.5])) == ["0.31 to 0.50"]
+    assert row_cells(columns, Row(method="semi-metric")) == ["-"]

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hippodrome.eval.gate.baseline import Baseline, Cell, Figure
+from hippodrome.eval.commands.gate import SEEDS
+from hippodrome.eval.gate.baseline import Baseline, Cell, Figure, read_baseline
 from hippodrome.eval.gate.compare import ALPHA, REPEATABILITY, compare
 
 SAMPLES = json.loads((Path(__file__).parent / "gate_samples.json").read_text(encoding="utf-8"))
@@ -80,3 +81,11 @@ def test_other_drives_of_the_same_code_fail_as_rarely_as_promised():
         names = np.random.default_rng(build).permutation(sorted(DRIVES))
         failed += bool(regressed(compare(drawn(names[:6]), drawn(names[6:12]))))
     assert failed <= 200 * ALPHA + 3.0 * np.sqrt(200 * ALPHA)
+
+
+def test_the_committed_baseline_is_what_make_gate_runs():
+    root = Path(__file__).parents[2] / "scenarios"
+    cells = read_baseline(root / "baseline.json").cells
+    assert {cell.scenario for cell in cells} == {path.stem for path in (root / "gate").glob("*.yaml")}
+    assert {cell.seed for cell in cells} == set(SEEDS)
+    assert not any(cell.failed for cell in cells)

@@ -11,7 +11,9 @@ from hippodrome.eval.figures.style import BLUE, VERMILION, log_errors, new_figur
 
 
 def draw_stress(path: Path, apes_m: Mapping[str, Sequence[float | None]]) -> None:
-    """A column of dots per case, one dot a run (mean APE of its map), a bar at their mean; failed runs counted above."""
+    """A column of dots per case, one dot a run (mean APE of its map), a bar at their mean; runs in which nothing is
+    vouched for, as it must be where the drive never was, counted above.
+    """
     figure = new_figure(1.2 + 1.15 * len(apes_m), 4.6)
     axes = figure.subplots()
     known = [np.array([value for value in values if value is not None]) for values in apes_m.values()]
@@ -22,15 +24,8 @@ def draw_stress(path: Path, apes_m: Mapping[str, Sequence[float | None]]) -> Non
             axes.plot([place - 0.3, place + 0.3], [values.mean()] * 2, color=VERMILION, linewidth=2)
             axes.text(place + 0.32, values.mean(), f"{values.mean():.2f}", fontsize=8, va="center", color=VERMILION)
         if len(values) < len(all_runs):
-            axes.text(
-                place,
-                0.98,
-                f"{len(all_runs) - len(values)} failed",
-                transform=axes.get_xaxis_transform(),
-                fontsize=8,
-                ha="center",
-                va="top",
-            )
+            label, above = f"{len(all_runs) - len(values)} of {len(all_runs)}\nrefused", axes.get_xaxis_transform()
+            axes.text(place, 0.98, label, transform=above, fontsize=8, ha="center", va="top")
     tidy(axes, "", "mean APE of a run (m)", "Refinement under stress: one dot a town and seed, bar: mean")
     axes.set_xticks(range(len(apes_m)), [name.replace(" ", "\n", 1) for name in apes_m], fontsize=8)
     axes.set_xlim(-0.6, len(apes_m) - 0.1)

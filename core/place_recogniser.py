@@ -12,7 +12,7 @@ import numpy as np
 from hippodrome.core import localizer_places, view_cells, view_search
 from hippodrome.core.localizer_config import LocalizerConfig
 from hippodrome.core.localizer_places import Places
-from hippodrome.core.types import Float32Array, FloatArray, Frame, IntArray
+from hippodrome.core.types import Float32Array, FloatArray, Frame, HippodromeError, IntArray
 from hippodrome.core.view_search import Found
 
 NOWHERE: IntArray = np.zeros(0, dtype=np.int32)
@@ -28,9 +28,18 @@ class Recognised:
 
 
 class PlaceRecogniser:
-    """Feed it frames in order; ``sequence.memory`` 0 makes each look stand alone."""
+    """Feed it frames in order; ``sequence.memory`` 0 makes each look stand alone.
+
+    Raises HippodromeError where the localizer's view cells are not of the map's kind and shape.
+    """
 
     def __init__(self, places: Places, config: LocalizerConfig) -> None:
+        own, mapped = (config.views.kind, config.views.shape), (places.bank.kind, tuple(places.bank.shape))
+        if own != mapped:
+            raise HippodromeError(
+                f"the map's view cells are {mapped[0]} of shape {mapped[1]}, the localizer's {own[0]} of shape {own[1]}: "
+                "give `localizer.views` the values that `mapper.memory.view_cells` had"
+            )
         gradient, sequence = places.bank.kind == "gradient", config.sequence
         self._places, self._config = places, config
         self._spread_floor = sequence.sigma_floor if gradient else sequence.grey_sigma_floor

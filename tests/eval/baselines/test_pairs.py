@@ -5,7 +5,7 @@ import pytest
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.baselines.orbslam3.pairs import draw_pairs, missing_chunks, read_pair, stereo_drive
-from hippodrome.sim.record import RecordingPlan, draw_chunk, prepare
+from hippodrome.sim.record import RecordingPlan, close_renderer, draw_chunk, prepare
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scenario import DriveSpec, Scenario
 from hippodrome.sim.tour import TourSpec
@@ -22,7 +22,8 @@ def plan(tmp_path_factory):
         Scenario(name="pairs", seed=5, town=town, camera=camera, mapping=drive), "mapping", tmp_path_factory.mktemp("p")
     )
     prepare(one)
-    return one
+    yield one
+    close_renderer()  # one per process: the next module's would be refused
 
 
 def test_pairs_are_drawn_once_and_read_back_grey(plan):

@@ -52,8 +52,8 @@ def run() -> list[Row]:
         lane,
         "the rivals have no such mode",
     )
+    rows += _both("ours, noisy trace", lambda: _ours_on_trace(network, noisy), network, lane, "the lane stage, which takes metres")
     for name, trace in (("noisy trace", noisy), ("dead reckoning, true start and scale", reckoned)):
-        rows += _both(f"ours, {name}", lambda t=trace: _ours_on_trace(network, t), network, lane, "needs no metres, may use them")
         for rival, matcher in RIVALS.items():
             case = f"{rival}, {name}"
             if find_spec(rival) is None:

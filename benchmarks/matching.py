@@ -52,7 +52,9 @@ def run() -> list[Row]:
         lane,
         "the rivals have no such mode",
     )
-    rows += _both("ours, noisy trace", lambda: _ours_on_trace(network, noisy), network, lane, "the lane stage, which takes metres")
+    rows += _both(
+        "ours, noisy trace", lambda: _ours_on_trace(network, noisy), network, lane, "the lane stage, which takes metres"
+    )
     for name, trace in (("noisy trace", noisy), ("dead reckoning, true start and scale", reckoned)):
         for rival, matcher in RIVALS.items():
             case = f"{rival}, {name}"

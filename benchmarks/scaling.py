@@ -2,7 +2,8 @@
 
 One synthetic town of about 80 km of road for all sizes, driven again and again; vertices 5 m apart, loop closures, drift and a
 wandering scale as the tests' synthetic drives have them. Each size runs in a process of its own, so that its peak memory is its
-own; the time is the processor's. ``python -m benchmarks.scaling 1000 30000`` runs those sizes, ``--full`` those of ``FULL``. A log-log plot goes to ``PLOT``.
+own; the time is the processor's. ``python -m benchmarks.scaling 1000 30000`` runs those sizes, ``--full`` those of ``FULL``. A
+log-log plot goes to ``PLOT``.
 """
 
 from __future__ import annotations

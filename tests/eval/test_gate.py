@@ -2,14 +2,11 @@
 
 import io
 import json
-import re
 import xml.etree.ElementTree as ElementTree
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from rich.console import Console
 
 from hippodrome.eval.cli import main
@@ -30,7 +27,6 @@ from hippodrome.eval.gate.report import junit_xml, print_verdict, summary_markdo
 from hippodrome.eval.results import ErrorSummary, LocalizationSummary, Network, Results, Row, ScenarioResult, write_results
 from hippodrome.sim.scenario import Scenario, load_scenario
 
-ROOT = Path(__file__).parents[2]
 TOWNS, SEEDS, METHODS = ("rural", "grid", "radial", "random"), (1, 2, 3), ("semi-metric", "topometric (paper)", "topometric")
 LEVEL_M = {"semi-metric": 60.0, "topometric (paper)": 1.0, "topometric": 0.4}
 
@@ -301,11 +297,3 @@ def test_compare_shows_what_moved_between_two_folders(tmp_path, capsys):
     fake_run(0.5)([load_scenario(scenario)], 1, tmp_path / "other")
     assert main(["compare", str(tmp_path / "one"), str(tmp_path / "other")]) == 2
     assert "the scenario has changed" in capsys.readouterr().err
-
-
-def test_the_workflow_calls_targets_that_exist():
-    workflow = yaml.safe_load((ROOT / "docs" / "gate-github.yml").read_text(encoding="utf-8"))
-    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE))
-    called = [step["run"].split() for step in workflow["jobs"]["gate"]["steps"] if "run" in step]
-    assert called == [["make", "gate"]]
-    assert {words[1] for words in called} <= targets

@@ -97,4 +97,4 @@ class Topometric:
 
 def file_stem(method: str) -> str:
     """A method's name as a file name: ``topometric (paper)`` becomes ``topometric-paper``."""
-    return method.replace(" (", "-").replace(")", "").replace(" ", "-")
+    return method.replace(" (", "-").replace(")", "").replace(",", "").replace(" ", "-")

@@ -140,7 +140,9 @@ def _ring(axes: Any, estimate: LocalizationEstimate) -> None:
     activity = head_ring(estimate)
     angles = np.linspace(-np.pi, np.pi, RING_SIZE, endpoint=False)
     axes.bar(angles, activity / activity.max(), width=2.0 * np.pi / RING_SIZE, bottom=1.2, color=BLUE, linewidth=0)
-    axes.plot([estimate.pose[2]] * 2, [0.0, 1.1], color=VERMILION, linewidth=1.5)
+    axes.plot(np.linspace(-np.pi, np.pi, 90), np.full(90, 1.2), color=FAINT, linewidth=0.8)
+    if estimate.localized:  # before, the pose is but a beginning
+        axes.plot([estimate.pose[2]] * 2, [0.0, 1.1], color=VERMILION, linewidth=1.5)
     axes.set_ylim(0.0, 2.3)
     axes.set_xticks([])
     axes.set_yticks([])

@@ -40,10 +40,10 @@ def _attractor_tick() -> Row:
     head_config, grid_config = AttractorConfig(), AttractorConfig(information=grid_cells.GRID_INFORMATION)
     head = head_direction.known(0.3, head_config)
     grid = grid_cells.known(np.zeros(2), grid_cells.module_periods(97.0), grid_config)
-    noise = np.full(2, 1e-4)
+    noise = np.full((2, 2), 1e-4)
 
     def tick() -> None:
-        moved = head_direction.inhibit(head_direction.integrate(head, 0.1, 0.1, 1e-6), 0.1, head_config)
+        moved = head_direction.inhibit(head_direction.integrate(head, 0.1, 0.1, (1e-6, 1e-6)), 0.1, head_config)
         step = grid_cells.displacement(moved.mean_rad, 8.0, 0.1)
         placed = grid_cells.inhibit(grid_cells.integrate(grid, step, noise), 0.1, grid_config)
         head_direction.read_out(moved)

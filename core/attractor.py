@@ -117,14 +117,16 @@ def overlap(mu_inte: Real, r_inte: Real, mu_cali: Real, r_cali: Real) -> Real:
 
 
 @njit(cache=True)
-def forget(mu_inte: Real, r_inte: Real, mu_cali: Real, r_cali: Real, sq_sigma: Real) -> tuple[Real, Real]:
-    """Reliabilities after motion noise of variance ``sq_sigma``, as path integration adds it (mode "default" only).
+def forget(
+    mu_inte: Real, r_inte: Real, mu_cali: Real, r_cali: Real, sq_sigma_inte: Real, sq_sigma_cali: Real
+) -> tuple[Real, Real]:
+    """Reliabilities after motion noise of variances ``sq_sigma_*``, as path integration adds it (mode "default" only).
 
     Populations that agree share one belief and fade together, their sum as 1/(1/W + sq_sigma); in conflict each fades alone.
     """
     shared = overlap(mu_inte, r_inte, mu_cali, r_cali)
-    inte = r_inte / (1.0 + sq_sigma * (r_inte + shared * r_cali))
-    return inte, r_cali / (1.0 + sq_sigma * (r_cali + shared * r_inte))
+    inte = r_inte / (1.0 + sq_sigma_inte * (r_inte + shared * r_cali))
+    return inte, r_cali / (1.0 + sq_sigma_cali * (r_cali + shared * r_inte))
 
 
 @njit(cache=True)

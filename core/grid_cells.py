@@ -78,13 +78,14 @@ def _integrate(
         for a in range(2):
             for p in range(2):
                 mean[m, p, a] = wrap(old_mean[m, p, a] + step[p, a] * per_length)
-            if sq_sigma[a] != 0.0:
+            if sq_sigma[0, a] != 0.0 or sq_sigma[1, a] != 0.0:
                 reliability[m, 0, a], reliability[m, 1, a] = attractor.forget(
                     old_mean[m, 0, a],
                     old_reliability[m, 0, a],
                     old_mean[m, 1, a],
                     old_reliability[m, 1, a],
-                    sq_sigma[a] * per_length**2,
+                    sq_sigma[0, a] * per_length**2,
+                    sq_sigma[1, a] * per_length**2,
                 )
     return mean, reliability
 
@@ -92,8 +93,8 @@ def _integrate(
 def integrate(state: GridState, step: FloatArray, sq_sigma: FloatArray) -> GridState:
     """Path integration by displacements ``step`` (2 populations, 2 axes).
 
-    ``sq_sigma`` (2,) is the variance that the motion adds per axis (0: as printed). Each population moves along its own
-    head direction, so that a challenger carries its own heading.
+    ``sq_sigma`` (2 populations, 2 axes) is the variance that the motion adds (0: as printed). Each population moves along its
+    own head direction, so that a challenger carries its own heading.
     """
     mean, reliability = _integrate(state.mean_rad, state.reliability, state.period, step, sq_sigma)
     return GridState(state.period, mean, reliability)

@@ -30,14 +30,16 @@ def known(heading_rad: float, config: AttractorConfig) -> HeadDirectionState:
     return HeadDirectionState(np.full(2, attractor.wrap(heading_rad)), reliability)
 
 
-def integrate(state: HeadDirectionState, omega_radps: float, dt_s: float, sq_sigma_rad: float = 0.0) -> HeadDirectionState:
-    """Path integration: both peaks turn by omega dt; ``sq_sigma_rad`` is the variance that the motion adds (0: as printed)."""
+def integrate(
+    state: HeadDirectionState, omega_radps: float, dt_s: float, sq_sigma_rad: tuple[float, float] = (0.0, 0.0)
+) -> HeadDirectionState:
+    """Path integration: both peaks turn by omega dt; the motion adds ``sq_sigma_rad`` to each's variance (0: as printed)."""
     turned = omega_radps * dt_s
     (mu_inte, mu_cali), (r_inte, r_cali) = state.mean_rad.tolist(), state.reliability.tolist()
     mean = np.array([attractor.wrap(mu_inte + turned), attractor.wrap(mu_cali + turned)])
-    if sq_sigma_rad == 0.0:
+    if sq_sigma_rad == (0.0, 0.0):
         return HeadDirectionState(mean, state.reliability)
-    return HeadDirectionState(mean, np.array(attractor.forget(mu_inte, r_inte, mu_cali, r_cali, sq_sigma_rad)))
+    return HeadDirectionState(mean, np.array(attractor.forget(mu_inte, r_inte, mu_cali, r_cali, *sq_sigma_rad)))
 
 
 def inhibit(state: HeadDirectionState, dt_s: float, config: AttractorConfig) -> HeadDirectionState:

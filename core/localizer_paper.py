@@ -56,7 +56,7 @@ class PaperPose:
         head = head_direction.inhibit(head, motion.dt_s, self.config.paper.head)
         heading_rad, _ = head_direction.read_out(head)
         step = grid_cells.displacement(np.full(2, heading_rad), motion.travelled * math.exp(self.log_scale), 1.0)
-        grid = grid_cells.integrate(self.grid, step, np.zeros(2))
+        grid = grid_cells.integrate(self.grid, step, np.zeros((2, 2)))
         grid = grid_cells.inhibit(grid, motion.dt_s, self.config.paper.grid)
         position_m, _ = grid_cells.read_out(grid, self.position_m + step[0])
         return replace(self, head=head, grid=grid, position_m=position_m)

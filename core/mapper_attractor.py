@@ -61,7 +61,7 @@ def path_integrate(state: NeuralPose, motion: FloatArray, dt_s: float, config: M
     """One body motion (3,) into both networks, then mutual and global inhibition, Eqs. (3)-(7), Li et al. 2025."""
     step = _rotated(state.head.mean_rad, motion[:2])
     head = head_direction.integrate(state.head, float(motion[2]) / dt_s, dt_s)
-    grid = grid_cells.integrate(state.grid, step, np.zeros(2))
+    grid = grid_cells.integrate(state.grid, step, np.zeros((2, 2)))
     return NeuralPose(
         head=head_direction.inhibit(head, dt_s, config.head),
         grid=grid_cells.inhibit(grid, dt_s, config.grid),

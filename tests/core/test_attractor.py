@@ -87,12 +87,12 @@ def test_injection_commutes_with_rotation(mu, r, mu_inject, r_inject, rotation):
 @settings(deadline=None)  # numba compiles on first use
 @given(reliability, reliability, st.floats(1e-6, 10.0))
 def test_forgetting_adds_variance_to_a_shared_belief(r_inte, r_cali, sq_sigma):
-    inte, cali = attractor.forget(0.4, r_inte, 0.4, r_cali, sq_sigma)
+    inte, cali = attractor.forget(0.4, r_inte, 0.4, r_cali, sq_sigma, sq_sigma)
     assert_allclose(1.0 / (inte + cali), 1.0 / (r_inte + r_cali) + sq_sigma, rtol=1e-9)
 
 
 def test_forgetting_in_conflict_fades_each_belief_alone():
-    inte, cali = attractor.forget(0.0, 100.0, 2.0, 25.0, 0.01)
+    inte, cali = attractor.forget(0.0, 100.0, 2.0, 25.0, 0.01, 0.01)
     assert_allclose((1 / inte, 1 / cali), (0.02, 0.05))
 
 

@@ -47,14 +47,14 @@ def test_integration_unwraps_every_step(start, motions):
     state, near, expected = tori.known(start, PERIODS, CONFIG), start, start.copy()
     for heading, speed in motions:
         step = tori.displacement(np.full(2, heading), speed, 0.5)
-        state = tori.integrate(state, step, np.zeros(2))
+        state = tori.integrate(state, step, np.zeros((2, 2)))
         near, _ = tori.read_out(state, near)
         expected += 0.5 * speed * np.array([np.cos(heading), np.sin(heading)])
     assert_allclose(near, expected, atol=1e-6)
 
 
 def test_motion_noise_widens_the_read_out_per_axis():
-    state = tori.integrate(tori.known(np.zeros(2), PERIODS, CONFIG), np.zeros((2, 2)), np.array([4.0, 0.0]))
+    state = tori.integrate(tori.known(np.zeros(2), PERIODS, CONFIG), np.zeros((2, 2)), np.tile([4.0, 0.0], (2, 1)))
     _, reliability = tori.read_out(state, np.zeros(2))
     assert_allclose(1.0 / reliability, [1.0 / 1.1 + 4.0, 1.0 / 1.1], rtol=1e-3)
 
@@ -76,7 +76,7 @@ def test_paper_injection_pulls_the_read_out_by_its_share():
 
 def test_populations_integrate_along_their_own_heading():
     state = tori.challenge(tori.known(np.zeros(2), PERIODS, CONFIG), np.array([500.0, 0.0]), np.ones(2))
-    state = tori.integrate(state, tori.displacement(np.array([0.0, np.pi / 2]), 10.0, 1.0), np.zeros(2))
+    state = tori.integrate(state, tori.displacement(np.array([0.0, np.pi / 2]), 10.0, 1.0), np.zeros((2, 2)))
     incumbent, _ = tori.population_belief(state, 0, np.zeros(2))
     challenger, _ = tori.population_belief(state, 1, np.array([500.0, 0.0]))
     assert_allclose(incumbent, [10.0, 0.0], atol=1e-6)

@@ -28,7 +28,7 @@ def test_start_holds_e_and_its_tenth():
 
 
 def test_motion_noise_widens_the_read_out():
-    state = ring.integrate(ring.known(0.0, CONFIG), 0.0, 0.1, sq_sigma_rad=0.02)
+    state = ring.integrate(ring.known(0.0, CONFIG), 0.0, 0.1, sq_sigma_rad=(0.02, 0.02))
     assert_allclose(1.0 / ring.read_out(state)[1], 1.0 / 110.0 + 0.02)
 
 
@@ -73,6 +73,6 @@ def test_conflict_keeps_two_beliefs_until_one_is_adopted():
 def test_steps_do_not_touch_their_argument():
     state = ring.known(0.3, CONFIG)
     before = (state.mean_rad.copy(), state.reliability.copy())
-    ring.inhibit(ring.inject(ring.integrate(state, 1.0, 0.1, 0.1), 1.0, 10.0, CONFIG), 0.1, CONFIG)
+    ring.inhibit(ring.inject(ring.integrate(state, 1.0, 0.1, (0.1, 0.1)), 1.0, 10.0, CONFIG), 0.1, CONFIG)
     assert np.array_equal(state.mean_rad, before[0])
     assert np.array_equal(state.reliability, before[1])

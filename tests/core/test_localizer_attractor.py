@@ -38,7 +38,7 @@ def seen(rng, pose):
 def test_the_networks_hold_what_a_kalman_filter_would_from_the_first_challenge_on(seed):
     rng = np.random.default_rng(seed)
     beliefs = [kind.uniform(np.zeros(2), 0.0, CONFIG) for kind in (AttractorPose, KalmanPose)]
-    poses, motions = drive(rng, 300)
+    poses, motions = drive(rng, 60)
     for i, (pose, motion) in enumerate(zip(poses, motions, strict=True)):
         beliefs = [belief.predict(motion) for belief in beliefs]
         if i % 4:

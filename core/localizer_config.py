@@ -28,6 +28,7 @@ class MotionNoise:
     gyro_gain: float = 0.01  # share of the turned angle
     scale_prior: float = 0.3  # sigma of ln(metres per unit) of this drive about the map's: two drives' spreads of 0.2
     scale_walk_per_sqrt_m: float = 0.004  # ln(scale) wanders 4 % in 100 m
+    scale_jump: float = 0.1  # sigma of ln(scale) once views keep lying ahead or behind: an odometry that was set up anew
 
 
 VISUAL_NOISE = MotionNoise(  # of self-motion from the frames: 5 % per 50 m and 1 deg at its best, and turns that it loses
@@ -45,6 +46,9 @@ class InjectionNoise:
     across_m: float = 0.4  # two drivers' wander inside a lane, 0.2 to 0.5 m, correlated over tens of metres
     heading_rad: float = 0.05
     map_m: float = 0.4  # along the road, beyond what the map's covariance says: that takes self-motion's errors for white
+    wander_m: float = (
+        0.3  # of this driver in the lane, 0.2 to 0.5 m: slow, and no view shows it; it goes into the covariance only
+    )
     gate: float = 12.0  # squared Mahalanobis distance beyond which an injection conflicts (3 dof: 99.3 %)
 
 

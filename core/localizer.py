@@ -41,8 +41,6 @@ from hippodrome.core.visual_odometry import VisualOdometry
 __all__ = ["Localizer", "LocalizerConfig", "localize"]
 
 ACROSS_SHARE = 0.1  # of a look in the running mean of what views disagree by across the road: some 30 m
-DRIFT_MEMORY = 0.8  # of the views' mean offset along the road, in sigmas, per view
-DRIFT_LIMIT = 0.8  # of that mean: 2.4 sigmas of it if the views erred independently; then the scale has jumped
 LANE_M = 3.0  # they show the lane: farther off is another place, or a bend
 
 PoseBelief: TypeAlias = AttractorPose | KalmanPose | LanePose | PaperPose
@@ -77,7 +75,6 @@ class Localizer:
         self._evidence = 0.0  # modes "paper" and "lanes": summed margins so far
         self._support, self._challenge = 0.0, 0.0  # summed margins of the incumbent and the challenger, as far as remembered
         self._sq_map: FloatArray = np.zeros((3, 3))  # error of the map where it was recognised last
-        self._drift = 0.0  # of the views about the belief, along the road, a running mean, in sigmas
         self._sq_across = 0.0  # of the views about the belief, across the road, a running mean, m^2
         self._mapped = True  # as far as known
         self._seen = 0.0  # z-score that the believed place has in the views, a running mean; 0: a new fix, none yet
@@ -161,9 +158,6 @@ class Localizer:
     def _support_incumbent(self, belief: AttractorPose | KalmanPose, injection: Injection) -> None:
         """An outlier within the same place counts as much as a view at the gate: Student's weight, Huber's reason."""
         self._sq_across += ACROSS_SHARE * (_sq_across(belief.pose, injection.pose) - self._sq_across)
-        self._drift += (1.0 - DRIFT_MEMORY) * (_sigmas_ahead(belief, injection) - self._drift)
-        if abs(self._drift) > DRIFT_LIMIT:
-            belief, self._drift = belief.doubt_scale(self._config.motion.scale_jump**2), 0.0
         excess = max(1.0, belief.sq_distance(injection) / self._config.injection.gate)
         self._belief = belief.inject(Injection(injection.pose, excess * injection.covariance))
         self._support, self._challenge = self._support + self._weight * self._margin, 0.0
@@ -208,14 +202,6 @@ def _sq_across(pose: FloatArray, seen: FloatArray) -> float:
     """Squared distance (m^2) of a seen pose (3,) from the believed one's line of travel, that of the same place at most."""
     offset = seen[:2] - pose[:2]
     return min(float(offset[1] * math.cos(pose[2]) - offset[0] * math.sin(pose[2])) ** 2, LANE_M**2)
-
-
-def _sigmas_ahead(belief: AttractorPose | KalmanPose, injection: Injection) -> float:
-    """How far along the road the injection lies ahead of the belief, in standard deviations, three at most."""
-    heading_rad = belief.pose[2]
-    ahead = np.array([math.cos(heading_rad), math.sin(heading_rad)])
-    sq_sigma = ahead @ (belief.covariance + injection.covariance)[:2, :2] @ ahead
-    return float(np.clip((injection.pose - belief.pose)[:2] @ ahead / math.sqrt(sq_sigma), -3.0, 3.0))
 
 
 def _sigma_m(covariance: FloatArray) -> float:

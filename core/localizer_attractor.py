@@ -139,13 +139,6 @@ class AttractorPose:
         reached = Ties(pose[:2] + shift[:2], ties.log_scale + float(shift[3]), after)
         return _Share(pose + offset, (1.0 / left - 1.0) / before, reached)
 
-    def doubt_scale(self, sq_sigma: float) -> Self:
-        """The incumbent's scale may have jumped: ``sq_sigma`` is added to its variance."""
-        ties, coupling = self.ties[INTEGRATOR], self.ties[INTEGRATOR].coupling.copy()
-        coupling[3, 3] += sq_sigma
-        doubted = replace(ties, coupling=coupling)
-        return replace(self, ties=(doubted, self.ties[CALIBRATION] if self.challenged else doubted))
-
     def challenge(self, injection: Injection) -> Self:
         """A conflicting injection: the calibration cells leave for it, the integrators stay."""
         xy_m, heading_rad = injection.pose[:2], float(injection.pose[2])

@@ -28,7 +28,6 @@ class MotionNoise:
     gyro_gain: float = 0.01  # share of the turned angle
     scale_prior: float = 0.3  # sigma of ln(metres per unit) of this drive about the map's: two drives' spreads of 0.2
     scale_walk_per_sqrt_m: float = 0.004  # ln(scale) wanders 4 % in 100 m
-    scale_jump: float = 0.1  # sigma of ln(scale) once views keep lying ahead or behind: an odometry that was set up anew
 
 
 VISUAL_NOISE = MotionNoise(  # of self-motion from the frames: 5 % per 50 m and 1 deg at its best, and turns that it loses

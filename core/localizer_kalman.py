@@ -72,11 +72,6 @@ class KalmanPose:
         """Measurement update; the challenger is dismissed."""
         return replace(self, incumbent=_update(self.incumbent, injection), challenger=None)
 
-    def doubt_scale(self, sq_sigma: float) -> Self:
-        """The incumbent's scale may have jumped: ``sq_sigma`` is added to its variance."""
-        covariance = self.incumbent.covariance + np.diag([0.0, 0.0, 0.0, sq_sigma])
-        return replace(self, incumbent=replace(self.incumbent, covariance=covariance))
-
     def challenge(self, injection: Injection) -> Self:
         """A conflicting injection: a second hypothesis with the incumbent's scale."""
         covariance = np.zeros((4, 4))

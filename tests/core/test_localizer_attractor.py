@@ -66,22 +66,3 @@ def test_a_challenger_learns_the_scale_while_the_incumbent_keeps_its_own():
         belief = belief.predict(motion).reinforce(seen(rng, pose))
     assert belief.log_scale == 0.0
     assert belief.adopt().log_scale == pytest.approx(np.log(1.25), abs=0.03)
-
-
-@pytest.mark.parametrize("kind", [AttractorPose, KalmanPose])
-def test_a_doubted_scale_is_learned_anew_from_views_that_keep_lying_ahead(kind):
-    ahead = Motion(0.7, 0.0, DT_S)
-    covariance = np.diag([CONFIG.injection.along_m, CONFIG.injection.across_m, CONFIG.injection.heading_rad]) ** 2
-    belief = kind.uniform(np.zeros(2), 0.0, CONFIG).challenge(Injection(np.zeros(3), covariance)).adopt()
-    way_m = 0.0
-    for _ in range(100):
-        belief, way_m = belief.predict(ahead), way_m + 0.7
-        belief = belief.inject(Injection(np.array([way_m, 0.0, 0.0]), covariance))
-    doubted = belief.doubt_scale(CONFIG.motion.scale_jump**2)
-    for i in range(80):  # a fifth more to the unit than before
-        belief, doubted, way_m = belief.predict(ahead), doubted.predict(ahead), way_m + 1.2 * 0.7
-        if i % 4 == 0:
-            seen_there = Injection(np.array([way_m, 0.0, 0.0]), covariance)
-            belief, doubted = belief.inject(seen_there), doubted.inject(seen_there)
-    assert abs(doubted.pose[0] - way_m) < 0.5 * abs(belief.pose[0] - way_m)
-    assert abs(doubted.log_scale - np.log(1.2)) < abs(belief.log_scale - np.log(1.2))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
 
@@ -14,13 +14,17 @@ from hippodrome.eval.baselines.orbslam3.rows import failed_rows, rows
 from hippodrome.eval.baselines.orbslam3.tracker import Run, RunTask, run_tracker
 from hippodrome.eval.baselines.orbslam3.training import VocabularyTask, train_vocabulary
 from hippodrome.eval.baselines.sequences import Located, SequenceRow
-from hippodrome.eval.pool import Workers
+from hippodrome.eval.pool import Workers, process_pool
 from hippodrome.eval.results import Row
 from hippodrome.sim.record import ROLES, RecordingPlan, prepare
 from hippodrome.sim.scenario import Scenario
 
 # The size and about the baseline of the published car data sets. Without grain most of a street's surface has no corner to track.
 STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5, "grain": True}
+
+
+TRACKER_BYTES = 6_000_000_000  # of memory, at the end of the paper's drive
+MOST_SIDE_BY_SIDE = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +56,7 @@ def stereo_scenario(scenario: Scenario) -> Scenario:
 
 
 def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers) -> Tracked:
-    """Table I's rows: runs of the tracker on the mapping drive, several at once as the pool has room."""
+    """Table I's rows: runs of the tracker on the mapping drive, side by side as memory has room."""
     try:
         python = ensure_environment(out / "venv")
     except NotInstalled as error:
@@ -63,13 +67,20 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
     folders = [out / scenario.name / "orb-slam3" / how / f"run-{number}" for number in range(options.runs)]
     tasks = [RunTask(python, vocabulary, drive, folder, options.paced, options.limit_s) for folder in folders]
     print(f"ORB-SLAM3: {options.runs} runs of {drive.frames:,} stereo pairs", flush=True)
-    runs = pool.run("track", run_tracker, tasks)
+    with process_pool(_side_by_side(options.runs)) as executor:
+        runs = replace(pool, executor=executor).run("track", run_tracker, tasks)
     found = rows(runs, drive)
     chosen = (found[-1].model_extra or {}).get("median_run")
     for run, one in zip(runs, tasks, strict=True):
         if run.folder.name == chosen:
             return Tracked(found, run, one)
     return Tracked(found)
+
+
+def _side_by_side(runs: int) -> int:
+    """Runs at once: on few cores too, as a frame often waits for its run's back end, and the last of several would run alone."""
+    available_bytes = 1024 * int(Path("/proc/meminfo").read_text().split("MemAvailable:")[1].split()[0])
+    return max(1, min(runs, MOST_SIDE_BY_SIDE, available_bytes // TRACKER_BYTES))
 
 
 def locate(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> list[Located]:

@@ -22,6 +22,7 @@ from hippodrome.core.view_cells import ViewCellBank, bank_of
 LINK_REACH_M = 15.0  # longest step between two looks; at 30 km/h they are 5 m apart
 LINK_BEND_RAD = 0.35  # the chord of a link points half its turn ahead, within this
 LINK_TURN_RAD = 1.2  # no vehicle turns more within one link
+BESIDE_M = 2.0  # cells closer than this are two visits of one place
 SAME_PLACE_M = 15.0  # cells closer than this show the same place and are no rivals
 SURE_SIGMAS = 2.0  # a position is taken to be within these of where it is believed
 SAME_WAY_RAD = math.radians(30.0)  # lanes and cells that lead the same way
@@ -43,6 +44,7 @@ class Places:
     link_from: IntArray  # (K,)
     link_length_m: FloatArray  # (K,)
     link_turn_rad: FloatArray  # (K,)
+    end: NDArray[np.bool_]  # (C,) no cell leads here, or none on from here: from beyond, this is what looks most like it
     onward_start: IntArray  # (C + 1,) the same links from their source: cell ``i`` leads to ``onward[start[i]:start[i + 1]]``
     onward: IntArray  # (K,)
 
@@ -61,7 +63,7 @@ def places_of(cognitive_map: CognitiveMap, network: RoadNetwork | None, lane_sig
     tree = cKDTree(poses[:, :2])
     links = _links(poses, tree)
     bank, onward = bank_of(cognitive_map.view_cells), _onward(*links[:2])
-    return Places(bank, poses, sq_map, tree, usable, before, after, *links, *onward)
+    return Places(bank, poses, sq_map, tree, usable, before, after, *links, _ends(links), *onward)
 
 
 def _map_covariance(cognitive_map: CognitiveMap, vertex: IntArray, sigma_m: float) -> FloatArray:
@@ -125,11 +127,21 @@ def _links(poses: FloatArray, tree: cKDTree) -> tuple[IntArray, IntArray, FloatA
     length = np.hypot(gap[:, 0], gap[:, 1])
     bend = np.abs(se2.wrap(np.arctan2(gap[:, 1], gap[:, 0]) - 0.5 * gap[:, 2]))
     beside = np.abs(gap[:, 1]) < 1.0  # two visits of one place: no step between them, the bearing means nothing
-    possible = (np.abs(gap[:, 2]) < LINK_TURN_RAD) & ((bend < LINK_BEND_RAD) | ((length < 2.0) & beside))
+    possible = (np.abs(gap[:, 2]) < LINK_TURN_RAD) & ((bend < LINK_BEND_RAD) | ((length < BESIDE_M) & beside))
     source, target, length, turn = source[possible], target[possible], length[possible], gap[possible, 2]
     order = np.lexsort((source, target))
     start = np.searchsorted(target[order], np.arange(len(poses) + 1))
     return start.astype(np.int32), source[order].astype(np.int32), length[order], turn[order]
+
+
+def _ends(links: tuple[IntArray, IntArray, FloatArray, FloatArray]) -> NDArray[np.bool_]:
+    """Cells (C,) that no link reaches, or that no link leaves; one to another visit of the same place does not count."""
+    start, source, length, _ = links
+    target = np.repeat(np.arange(len(start) - 1), np.diff(start))[length > BESIDE_M]
+    end = np.ones((2, len(start) - 1), dtype=np.bool_)
+    end[0, target], end[1, source[length > BESIDE_M]] = False, False
+    ends: NDArray[np.bool_] = np.logical_or(end[0], end[1])
+    return ends
 
 
 def _onward(start: IntArray, source: IntArray) -> tuple[IntArray, IntArray]:

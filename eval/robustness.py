@@ -10,8 +10,9 @@ import numpy as np
 
 from hippodrome.core.localizer_config import LocalizerConfig, Mode
 from hippodrome.core.road_network import RoadNetwork
-from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
-from hippodrome.eval.localization_score import FALSE_FIX_M, LocalizationScore, score_localization
+from hippodrome.core.types import CognitiveMap, HippodromeError, Observation, Trajectory
+from hippodrome.eval.localization_score import score_localization
+from hippodrome.eval.mapped_road import split_by_map
 from hippodrome.eval.materials import refine_config
 from hippodrome.eval.metrics import path_length_m
 from hippodrome.eval.place_recognition import half_known, looks_of, recognise
@@ -178,28 +179,16 @@ def sequence_result(
     run = localize_recording(observations, cognitive_map, roads, config)
     score = score_localization(run.estimates, truth, run.step_s)
     confidence = np.array([estimate.confidence for estimate in run.estimates])
+    on_map = split_by_map(score, truth.poses, cognitive_map)
     looks = np.append(True, np.diff(confidence) != 0.0)  # a look gives a new margin, a step without keeps the last
     return SequenceResult(
         number=number,
         start=tuple(float(value) for value in truth.poses[0]),
-        localized_after_m=score.initial_distance_m,
-        errors_m=_errors_after_fix(score),
+        on_map=on_map,
         false_fixes=score.false_fixes,
         false_share=score.false_fix_share,
-        steps=len(score.localized) - _first_fix(score),
         declared=int(score.localized.sum()),
         nees=score.mean_nees,
         step_ms=1e3 * float(run.step_s.mean()),
         look_ms=1e3 * float(np.median(run.step_s[looks])),
     )
-
-
-def _first_fix(score: LocalizationScore) -> int:
-    right = score.localized & (score.errors_m <= FALSE_FIX_M)
-    return int(np.argmax(right)) if right.any() else len(right)
-
-
-def _errors_after_fix(score: LocalizationScore) -> FloatArray:
-    """Errors of the declared steps from the initial localization on."""
-    first = _first_fix(score)
-    return score.errors_m[first:][score.localized[first:]]

@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hippodrome.core.localizer import Localizer, LocalizerConfig
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
 from hippodrome.eval.baselines.sequences import cut
 from hippodrome.eval.localization_score import FALSE_FIX_M, LocalizationScore, score_localization
+from hippodrome.eval.mapped_road import OnMap, mapped_way_m, on_mapped_road, split_by_map
 from hippodrome.eval.metrics import path_length_m
 from hippodrome.eval.paper_rows import SEQUENCE_LENGTH_M
 from hippodrome.eval.stages import localize_recording
@@ -24,10 +26,13 @@ JUMP_M = 100.0  # at least: farther than the error of any fix, and than a street
 KIDNAP_HEADINGS = "| condition | recovered | after median / max, m | wrong until at most, m |"
 KIDNAP_DEFINITION = (
     f"localized for {BEFORE_M:g} m, then carried to another place of the drive, at least {JUMP_M:g} m away; recovered: declared "
-    f"localized within {FALSE_FIX_M:g} m of the truth before {AFTER_M:g} m are driven; wrong until: the last metre at which the "
-    "old place was still declared. Drives without a right fix before the jump are left out."
+    f"localized within {FALSE_FIX_M:g} m of the truth before {AFTER_M:g} m are driven, after so many metres of mapped road; "
+    "wrong until: the last such metre at which the old place was still declared. Drives without a right fix before the jump are "
+    "left out."
 )
-PAPER_HEADINGS = "| sequence | length, m | error median, m | mean, m | p95, m | localized after, m | false fixes |"
+PAPER_HEADINGS = (
+    "| sequence | length, m | error median, m | mean, m | p95, m | off the map, m | localized after, m | false fixes |"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +51,7 @@ class PaperSequence:
     length_m: float
     failure: str | None = None
     score: LocalizationScore | None = None
+    on_map: OnMap | None = None
 
 
 def kidnappings(
@@ -61,7 +67,8 @@ def kidnappings(
             estimate = localizer.step(observation)
         if not estimate.localized or math.dist(estimate.pose[:2], poses_m[jump - 1, :2]) > FALSE_FIX_M:
             continue
-        found.append(_after(localizer, observations[landing:end], poses_m[landing:end]))
+        mapped = on_mapped_road(poses_m[landing:end], cognitive_map)
+        found.append(_after(localizer, observations[landing:end], poses_m[landing:end], mapped))
     return tuple(found)
 
 
@@ -81,8 +88,10 @@ def _jumps(poses_m: FloatArray, way_m: FloatArray, count: int) -> list[tuple[int
     return chosen
 
 
-def _after(localizer: Localizer, observations: Sequence[Observation], poses_m: FloatArray) -> Kidnapping:
-    way_m, wrong_m = path_length_m(poses_m), 0.0
+def _after(
+    localizer: Localizer, observations: Sequence[Observation], poses_m: FloatArray, mapped: NDArray[np.bool_]
+) -> Kidnapping:
+    way_m, wrong_m = mapped_way_m(poses_m, mapped), 0.0
     for observation, pose_m, driven_m in zip(observations, poses_m, way_m, strict=True):
         estimate = localizer.step(observation)
         if estimate.localized and math.dist(estimate.pose[:2], pose_m[:2]) <= FALSE_FIX_M:
@@ -109,7 +118,8 @@ def paper_sequences(
             continue
         run = localize_recording(observations[first:end], cognitive_map, roads, config)
         truth = Trajectory(samples.t_s[first:end], samples.poses_m[first:end])
-        found.append(replace(sequence, score=score_localization(run.estimates, truth, run.step_s)))
+        score = score_localization(run.estimates, truth, run.step_s)
+        found.append(replace(sequence, score=score, on_map=split_by_map(score, truth.poses, cognitive_map)))
     return tuple(found)
 
 
@@ -129,16 +139,15 @@ def kidnapping_summary(found: Sequence[Kidnapping]) -> dict[str, Any]:
 def paper_summary(sequences: Sequence[PaperSequence]) -> dict[str, Any]:
     """Errors of the declared steps, pooled over the sequences that fit into the drive."""
     scores = [one.score for one in sequences if one.score is not None]
-    right = [score for score in scores if score.success]
-    errors_m = [_declared_errors(score) for score in right]
-    pooled_m = np.concatenate([np.zeros(0), *errors_m])
-    after_m = [score.initial_distance_m for score in right if score.initial_distance_m is not None]
+    on_map = [one.on_map for one in sequences if one.on_map is not None]
+    pooled_m = np.concatenate([np.zeros(0), *(one.errors_m for one in on_map)])
+    off_map_m = np.concatenate([np.zeros(0), *(one.off_map_errors_m for one in on_map)])
+    after_m = [one.localized_after_m for one in on_map if one.localized_after_m is not None]
     return {
         "sequences": len(scores),
-        "successes": len(right),
-        "error_median_m": float(np.median(pooled_m)) if len(pooled_m) else None,
-        "error_mean_m": float(np.mean(pooled_m)) if len(pooled_m) else None,
-        "error_p95_m": float(np.percentile(pooled_m, 95.0)) if len(pooled_m) else None,
+        "successes": len(after_m),
+        **_error_summary(pooled_m),
+        "off_map_error_mean_m": _error_summary(off_map_m)["error_mean_m"],
         "localized_after_median_m": float(np.median(after_m)) if after_m else None,
         "localized_after_max_m": max(after_m, default=None),
         "false_fixes": sum(score.false_fixes for score in scores),
@@ -147,10 +156,20 @@ def paper_summary(sequences: Sequence[PaperSequence]) -> dict[str, Any]:
 
 def paper_record(sequence: PaperSequence) -> dict[str, Any]:
     """One length's row."""
-    score = sequence.score
+    score, on_map = sequence.score, sequence.on_map
     row = {"number": sequence.number, "length_m": sequence.length_m, "failure": sequence.failure}
-    names = ("success", "error_median_m", "error_mean_m", "error_p95_m", "initial_distance_m", "false_fixes", "mean_nees")
-    return row if score is None else {**row, **{name: getattr(score, name) for name in names}}
+    if score is None or on_map is None:
+        return row
+    found = {name: getattr(score, name) for name in ("success", "false_fixes", "mean_nees")}
+    off_map = {"off_map_error_mean_m": _error_summary(on_map.off_map_errors_m)["error_mean_m"]}
+    return {**row, **found, **_error_summary(on_map.errors_m), **off_map, "localized_after_m": on_map.localized_after_m}
+
+
+def _error_summary(errors_m: FloatArray) -> dict[str, float | None]:
+    if len(errors_m) == 0:
+        return {"error_median_m": None, "error_mean_m": None, "error_p95_m": None}
+    median_m, p95_m = (float(value) for value in np.percentile(errors_m, [50.0, 95.0]))
+    return {"error_median_m": median_m, "error_mean_m": float(errors_m.mean()), "error_p95_m": p95_m}
 
 
 def cases_markdown(kidnapped: dict[str, tuple[Kidnapping, ...]], paper: Sequence[PaperSequence]) -> str:
@@ -165,7 +184,7 @@ def cases_markdown(kidnapped: dict[str, tuple[Kidnapping, ...]], paper: Sequence
     lines.append("|---" * (PAPER_HEADINGS.count("|") - 1) + "|")
     for record in map(paper_record, paper):
         end = record["failure"] or record["false_fixes"]
-        lines.append(f"| {record['number']} | {record['length_m']:g} | {_error_figures(record, 'initial_distance_m')} | {end} |")
+        lines.append(f"| {record['number']} | {record['length_m']:g} | {_error_figures(record, 'localized_after_m')} | {end} |")
     row = paper_summary(paper)
     figures = _error_figures(row, "localized_after_median_m")
     lines.append(f"| all | {row['successes']} of {row['sequences']} localized | {figures} | {row['false_fixes']} |")
@@ -173,14 +192,9 @@ def cases_markdown(kidnapped: dict[str, tuple[Kidnapping, ...]], paper: Sequence
 
 
 def _error_figures(row: dict[str, Any], distance: str) -> str:
-    return " | ".join(_figure(row.get(key)) for key in ("error_median_m", "error_mean_m", "error_p95_m", distance))
+    keys = ("error_median_m", "error_mean_m", "error_p95_m", "off_map_error_mean_m", distance)
+    return " | ".join(_figure(row.get(key)) for key in keys)
 
 
 def _figure(value: float | None) -> str:
     return "-" if value is None else f"{value:.2f}"
-
-
-def _declared_errors(score: LocalizationScore) -> FloatArray:
-    first = int(np.argmax(score.localized & (score.errors_m <= FALSE_FIX_M)))
-    declared: FloatArray = score.errors_m[first:][score.localized[first:]]
-    return declared

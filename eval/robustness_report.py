@@ -12,6 +12,7 @@ import numpy as np
 from hippodrome.core.localizer_config import Mode
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.figures.style import ERROR_MAP, TRUTH, VERMILION, Axes, new_figure, save_figure
+from hippodrome.eval.mapped_road import MAPPED, OnMap
 from hippodrome.eval.results import to_json
 from hippodrome.eval.robustness_cases import (
     Kidnapping,
@@ -33,13 +34,16 @@ ELSEWHERE: Final = "another town"  # whatever is declared there is false
 WITHIN_M: Final = 200.0  # a start counts as a success if the localizer is right within this distance
 ERROR_RANGE_M: Final = (0.2, 20.0)  # of the heat map's colours: below is the map's own error, above is a false fix
 DEFINITION: Final = (
-    f"success: declared localized, and within 20 m of the truth, before {WITHIN_M:g} m are driven. Error: position, declared "
-    "steps from then on, pooled over sequences; worst: the largest mean error of one sequence. False: sequences with a declared "
-    "step more than 20 m wrong. Localized: share of steps after the first fix that are declared. NEES: per dimension (x, y, "
-    "heading), 1 is calibrated. Sequences overlap where the drive is short; all conditions drive the same route."
+    f"success: declared localized, and within 20 m of the truth, before {WITHIN_M:g} m of mapped road are driven. Error: "
+    "position, declared steps on mapped road from then on, pooled over sequences; worst: the largest mean error of one sequence. "
+    "Off the map: share of the declared steps elsewhere, by dead reckoning, and their mean error, m. False: sequences with a "
+    "declared step more than 20 m wrong, on the map or off it. Localized: share of steps after the first fix that are declared. "
+    "NEES: per dimension (x, y, heading), 1 is calibrated. Sequences overlap where the drive is short; all conditions drive the "
+    f"same route. Mapped: {MAPPED}."
 )
 HEADINGS: Final = (
-    "condition", "success", "error mean / p95 / worst, m", "localized after median / max, m", "false", "localized", "NEES",
+    "condition", "success", "error mean / p95 / worst, m", "localized after median / max, m", "off the map, error", "false",
+    "localized", "NEES",
 )  # fmt: skip
 
 
@@ -49,15 +53,18 @@ class SequenceResult:
 
     number: int  # of the start along the drive, from 1: ``--start`` runs it alone
     start: tuple[float, ...]  # true pose: m, m, rad
-    localized_after_m: float | None  # metres driven, None: never
-    errors_m: FloatArray  # declared steps from the first fix on
+    on_map: OnMap
     false_fixes: int
     false_share: float  # of the declared steps
-    steps: int  # from the first fix on; the declared ones have an error
     declared: int  # steps of the whole sequence
     nees: float | None  # mean over the declared steps
     step_ms: float  # mean over all steps, process CPU time
     look_ms: float  # median of the steps that look at a frame
+
+    @property
+    def localized_after_m(self) -> float | None:
+        """Metres of mapped road; None: never."""
+        return self.on_map.localized_after_m
 
     @property
     def success(self) -> bool:
@@ -66,11 +73,12 @@ class SequenceResult:
     @property
     def localized_share(self) -> float | None:
         """Of the steps from the first fix on."""
-        return len(self.errors_m) / self.steps if self.steps else None
+        on_map = self.on_map
+        return (len(on_map.errors_m) + len(on_map.off_map_errors_m)) / on_map.steps if on_map.steps else None
 
     @property
     def error_mean_m(self) -> float | None:
-        return float(self.errors_m.mean()) if len(self.errors_m) else None
+        return _mean(self.on_map.errors_m)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,21 +101,24 @@ class ConditionResult:
 
 def pooled(sequences: Sequence[SequenceResult]) -> dict[str, Any]:
     """Figures over sequences, from their steps; None without a sample."""
-    errors_m = np.concatenate([sequence.errors_m for sequence in sequences])
+    errors_m = np.concatenate([sequence.on_map.errors_m for sequence in sequences])
+    off_map_m = np.concatenate([sequence.on_map.off_map_errors_m for sequence in sequences])
     after_m = [sequence.localized_after_m for sequence in sequences if sequence.localized_after_m is not None]
-    steps = sum(sequence.steps for sequence in sequences)
+    declared, steps = len(errors_m) + len(off_map_m), sum(sequence.on_map.steps for sequence in sequences)
     means_m = [mean for sequence in sequences if (mean := sequence.error_mean_m) is not None]
     nees = [(sequence.nees, sequence.declared) for sequence in sequences if sequence.nees is not None]
     return {
         "sequences": len(sequences),
         "success_share": float(np.mean([sequence.success for sequence in sequences])),
-        "error_mean_m": float(errors_m.mean()) if len(errors_m) else None,
+        "error_mean_m": _mean(errors_m),
         "error_p95_m": float(np.percentile(errors_m, 95.0)) if len(errors_m) else None,
         "worst_sequence_mean_m": max(means_m, default=None),
         "localized_after_median_m": float(np.median(after_m)) if after_m else None,
         "localized_after_max_m": max(after_m, default=None),
         "false_sequences": sum(sequence.false_fixes > 0 for sequence in sequences),
-        "localized_share": len(errors_m) / steps if steps else None,
+        "off_map_share": len(off_map_m) / declared if declared else None,
+        "off_map_error_mean_m": _mean(off_map_m),
+        "localized_share": declared / steps if steps else None,
         "nees": sum(mean * count for mean, count in nees) / sum(count for _, count in nees) if nees else None,
     }
 
@@ -175,6 +186,7 @@ def _record(result: ConditionResult) -> dict[str, Any]:
             "start": list(sequence.start),
             "localized_after_m": sequence.localized_after_m,
             "error_mean_m": sequence.error_mean_m,
+            "off_map_error_mean_m": _mean(sequence.on_map.off_map_errors_m),
             "false_fixes": sequence.false_fixes,
             "false_share": sequence.false_share,
             "localized_share": sequence.localized_share,
@@ -211,6 +223,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
         f"{100 * row['success_share']:.0f} %",
         _figures(row, "error_mean_m", "error_p95_m", "worst_sequence_mean_m"),
         _figures(row, "localized_after_median_m", "localized_after_max_m"),
+        f"{_percent(row['off_map_share'])}, {_figures(row, 'off_map_error_mean_m')}",
         f"{row['false_sequences']} of {row['sequences']}",
         _percent(row["localized_share"]),
         _figures(row, "nees"),
@@ -264,6 +277,10 @@ def _cell(axes: Axes, column: int, row: int, sequence: SequenceResult) -> None:
     colour = VERMILION if bad else "white" if dark else TRUTH
     axes.text(column, row, "x" if after_m is None else f"{after_m:.0f}", ha="center", va="center", fontsize=7, color=colour,
               fontweight="bold" if bad else "normal")  # fmt: skip
+
+
+def _mean(values: FloatArray) -> float | None:
+    return float(values.mean()) if len(values) else None
 
 
 def _or_nan(value: float | None) -> float:

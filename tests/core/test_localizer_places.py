@@ -34,6 +34,12 @@ def test_links_follow_the_street_and_never_the_opposite_lane():
     assert [list(source[start[j] : start[j + 1]]) for j in range(4)] == [[0], [0, 1], [2], [2, 3]]
 
 
+def test_a_street_ends_where_nothing_leads_on_and_where_nothing_leads_from():
+    street = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.5, 0.2, 0.0]])  # two visits of its last place
+    links = places_module._links(street, cKDTree(street[:, :2]))
+    assert list(places_module._ends(links)) == [True, False, True, True]
+
+
 def test_evidence_runs_along_links_only():
     links = (np.array([0, 1, 3]), np.array([0, 0, 1]), np.array([0.0, 5.0, 0.0]), np.zeros(3))
     before, z, cells = np.array([2.0, 0.0], np.float32), np.array([0.5, 1.0], np.float32), np.arange(2, dtype=np.int32)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.mapped_road import OnMap
 from hippodrome.eval.place_recognition import Answers
 from hippodrome.eval.robustness import SEQUENCE_M, cuts, elsewhere
 from hippodrome.eval.robustness_cases import (
@@ -102,9 +103,8 @@ def test_sequences_are_spread_evenly_over_the_drive(tmp_path):
 
 def sequence(after_m=10.0, errors_m=(1.0, 3.0), false_fixes=0, nees=1.0, number=1):
     steps = 0 if after_m is None else len(errors_m) + 1
-    return SequenceResult(
-        number, (0.0, 0.0, 0.0), after_m, np.array(errors_m), false_fixes, 0.0, steps, len(errors_m), nees, 0.2, 0.8
-    )
+    on_map = OnMap(after_m, np.array(errors_m), np.zeros(0), steps)
+    return SequenceResult(number, (0.0, 0.0, 0.0), on_map, false_fixes, 0.0, len(errors_m), nees, 0.2, 0.8)
 
 
 def findings(*results):
@@ -131,7 +131,7 @@ def test_summary_by_hand():
 
 def test_a_condition_without_any_fix_is_a_row_all_the_same(tmp_path, capsys):
     results = [ConditionResult("same", (sequence(), sequence())), ConditionResult("night", (sequence(None, (), nees=None),) * 2)]
-    assert "| night | 0 % | - / - / - | - / - | 0 of 2 | - |" in markdown("town", results)
+    assert "| night | 0 % | - / - / - | - / - | -, - | 0 of 2 | - |" in markdown("town", results)
     report(tmp_path, "town", findings(*results))
     written = json.loads((tmp_path / "robustness.json").read_text())
     assert written["conditions"][1]["error_mean_m"] is None
@@ -150,7 +150,7 @@ def test_failures_say_how_to_run_them_again_and_the_yardsticks_have_rows(tmp_pat
     assert "start 7: 1 false fixes; again: `--conditions same --start 7`" in text
     assert text.count("--start") == 1  # a yardstick's failures are its own
     assert "| kalman | 100 % | 25.00 / 25.00 / 25.00 |" in text
-    assert "| 1 | 372.7 | - | - | - | - | the localization drive is 300 m long" in text
+    assert "| 1 | 372.7 | - | - | - | - | - | the localization drive is 300 m long" in text
     capsys.readouterr()
 
 

@@ -77,6 +77,7 @@ class Localizer:
         self._sq_map: FloatArray = np.zeros((3, 3))  # error of the map where it was recognised last
         self._sq_across = 0.0  # of the views about the belief, across the road, a running mean, m^2
         self._mapped = True  # as far as known
+        self._astray = False  # dead reckoning has led off the roads: it began at the wrong place, or went wrong
         self._seen = 0.0  # z-score that the believed place has in the views, a running mean; 0: a new fix, none yet
         self._margin, self._cell = 0.0, -1
         self._weight = 0.0  # of the last look as a witness; 0 before the first
@@ -123,6 +124,8 @@ class Localizer:
         if not self._fixed:
             return
         self._mapped = len(here) > 0 or self._seen == 0.0
+        sigma_m = _sigma_m(self._belief.covariance)
+        self._astray |= not self._mapped and not localizer_places.is_on_road(self._places, self._belief.pose, sigma_m)
         place = np.minimum(np.searchsorted(found.cells, here), len(found.cells) - 1)
         similarity = found.similarity[place[found.cells[place] == here]]
         if len(similarity) > 0:
@@ -152,7 +155,7 @@ class Localizer:
             if self._challenge >= config.fix_evidence + self._support:
                 self._belief, self._fixed = self._belief.adopt(), True
                 self._support, self._challenge = min(self._challenge, config.fix_evidence), 0.0
-                self._sq_map, self._seen = self._places.sq_map[self._cell], 0.0
+                self._sq_map, self._seen, self._astray = self._places.sq_map[self._cell], 0.0, False
         else:
             self._belief, self._challenge = belief.challenge(injection), self._weight * self._margin
 
@@ -163,7 +166,7 @@ class Localizer:
         self._belief = belief.inject(Injection(injection.pose, excess * injection.covariance))
         self._support, self._challenge = self._support + self._weight * self._margin, 0.0
         self._support = min(self._support, self._config.fix_evidence)
-        self._sq_map = self._places.sq_map[self._cell]
+        self._sq_map, self._astray = self._places.sq_map[self._cell], False
 
     def _estimate(self, t_s: float) -> LocalizationEstimate:
         belief = self._belief
@@ -194,7 +197,7 @@ class Localizer:
         if sigma_m >= self._config.lost_sigma_m:
             return LocalizationStatus.LOST
         unseen = self._seen != 0.0 and self._seen < self._config.seen_z and self._config.mode != "paper"
-        if unseen or self._challenge >= max(self._config.doubt_evidence, self._support):
+        if self._astray or unseen or self._challenge >= max(self._config.doubt_evidence, self._support):
             return LocalizationStatus.DOUBTED
         return LocalizationStatus.LOCALIZED if self._mapped else LocalizationStatus.OFF_MAP
 

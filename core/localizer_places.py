@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hippodrome.core import road_geometry, se2
+from hippodrome.core.road_geometry import RoadGeometry
 from hippodrome.core.road_network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, Float32Array, FloatArray, IntArray, MatchStatus
 from hippodrome.core.view_cells import ViewCellBank, bank_of
@@ -37,6 +38,7 @@ class Places:
     poses_m: FloatArray  # (C, 3)
     sq_map: FloatArray  # (C, 3, 3) error of the map itself, m, m, rad
     tree: cKDTree  # over the positions
+    roads: RoadGeometry | None  # mapped or not
     usable: NDArray[np.bool_]  # (C,) the refinement vouches for the pose
     before: IntArray  # (C,) cell of the visit before, -1: none near
     after: IntArray  # (C,)
@@ -54,16 +56,17 @@ def places_of(cognitive_map: CognitiveMap, network: RoadNetwork | None, lane_sig
     cells = len(cognitive_map.view_cells.templates)
     vertex = first_vertex(cognitive_map.view_cell, cells)
     poses, sq_map = cognitive_map.poses[vertex], _map_covariance(cognitive_map, vertex, map_sigma_m)
-    if network is not None and lane_sigma_m > 0.0:
+    roads = None if network is None else road_geometry.road_geometry(network)
+    if roads is not None and lane_sigma_m > 0.0:
         sq_across = across(sq_map, poses[:, 2])
-        poses = centred(poses, network, sq_across / (sq_across + lane_sigma_m**2))
+        poses = centred(poses, roads, sq_across / (sq_across + lane_sigma_m**2))
     match = cognitive_map.road_match
     usable = np.ones(cells, dtype=np.bool_) if match is None else match.status[vertex] == MatchStatus.MATCHED
     before, after = _neighbours(vertex, cognitive_map, poses)
     tree = cKDTree(poses[:, :2])
     links = _links(poses, tree)
     bank, onward = bank_of(cognitive_map.view_cells), _onward(*links[:2])
-    return Places(bank, poses, sq_map, tree, usable, before, after, *links, _ends(links), *onward)
+    return Places(bank, poses, sq_map, tree, roads, usable, before, after, *links, _ends(links), *onward)
 
 
 def _map_covariance(cognitive_map: CognitiveMap, vertex: IntArray, sigma_m: float) -> FloatArray:
@@ -95,6 +98,14 @@ def cells_here(places: Places, pose_m: FloatArray, sigma_m: float) -> IntArray:
     turn_rad = np.abs(se2.wrap(places.poses_m[near, 2] - pose_m[2]))
     same_way: IntArray = near[turn_rad < LINK_TURN_RAD]
     return same_way
+
+
+def is_on_road(places: Places, pose_m: FloatArray, sigma_m: float) -> bool:
+    """Whether a road that leads the way of ``pose_m`` (3,) is where the pose may be for all that is known."""
+    if places.roads is None:
+        return True
+    lanes = road_geometry.project(places.roads, pose_m[None, :2], LANE_REACH_M + SURE_SIGMAS * sigma_m)
+    return bool((np.abs(se2.wrap(lanes.heading_rad - pose_m[2])) < LINK_TURN_RAD).any())
 
 
 def first_vertex(view_cell: IntArray, cells: int) -> IntArray:
@@ -249,9 +260,9 @@ def peak_offset(back_m: float, ahead_m: float, fall_back: float, fall_ahead: flo
     return min(max(0.5 * slope / curvature, -0.5 * back_m), 0.5 * ahead_m)
 
 
-def centred(poses_m: FloatArray, network: RoadNetwork, share: FloatArray) -> FloatArray:
+def centred(poses_m: FloatArray, roads: RoadGeometry, share: FloatArray) -> FloatArray:
     """Poses drawn sideways by ``share`` (N,) of the way to the lane's centre, where exactly one lane of their way is near."""
-    lanes = road_geometry.project(road_geometry.road_geometry(network), poses_m[:, :2], LANE_REACH_M)
+    lanes = road_geometry.project(roads, poses_m[:, :2], LANE_REACH_M)
     same_way = np.abs(se2.wrap(lanes.heading_rad - poses_m[lanes.point, 2])) < SAME_WAY_RAD
     fits = np.bincount(lanes.point[same_way], minlength=len(poses_m)) == 1
     row = np.flatnonzero(same_way & fits[lanes.point])

@@ -108,6 +108,17 @@ def test_off_the_map_is_said_while_dead_reckoning_still_knows_where():
     assert all(off[left + 50 : left + 80])
 
 
+def test_dead_reckoning_that_leads_off_the_roads_is_doubted():
+    part = topometric_map(PICTURES, np.random.default_rng(3), span_m=0.35 * loop_length())
+    observations, _ = drive(PICTURES, np.random.default_rng(11), 137.0, 350.0)
+    left = int((0.35 * loop_length() - 137.0) / 0.8) + 10
+    across_fields = (replace(one, yaw_rate_radps=0.0) for one in observations[left:])
+    estimates = localize([*observations[:left], *across_fields], part, loop_road(), LocalizerConfig())
+    assert estimates[left + 30].status is LocalizationStatus.OFF_MAP
+    assert estimates[-1].status is LocalizationStatus.DOUBTED
+    assert localize(observations, part, loop_road(), LocalizerConfig())[-1].status is LocalizationStatus.OFF_MAP
+
+
 def test_standing_adds_no_doubt_and_no_uncertainty():
     observations, _ = drive(PICTURES, np.random.default_rng(11), 137.0, 150.0)
     other = PICTURES.frame(600.0, np.random.default_rng(0))  # a lorry pulls up: nothing of the street is seen any more

@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 
 from hippodrome.core import localizer_places as places_module
 from hippodrome.core import se2
+from hippodrome.core.road_geometry import road_geometry
 from hippodrome.core.road_network import RoadNetwork
 from tests.core.looped_world import Pictures, topometric_map
 
@@ -87,8 +88,8 @@ def test_lane_pull_needs_a_single_lane_of_the_same_way():
         )
 
     pose = np.array([[50.0, 0.6, 0.05]])
-    single = network(lane(0.0, True), lane(3.2, False))
+    single = road_geometry(network(lane(0.0, True), lane(3.2, False)))
     assert_allclose(places_module.centred(pose, single, np.array([0.5])), [[50.0, 0.3, 0.05]])
-    double = network(lane(0.0, True), lane(3.2, True))
+    double = road_geometry(network(lane(0.0, True), lane(3.2, True)))
     assert_allclose(places_module.centred(pose, double, np.array([0.5])), pose)
     assert_allclose(se2.wrap(pose[:, 2]), pose[:, 2])

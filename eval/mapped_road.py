@@ -27,6 +27,7 @@ class OnMap:
     errors_m: FloatArray  # declared steps on mapped road, from the initial localization on
     off_map_errors_m: FloatArray  # declared steps elsewhere: dead reckoning
     steps: int  # from the initial localization on
+    way_m: float  # mapped road of the whole drive
 
 
 def split_by_map(score: LocalizationScore, poses_m: FloatArray, cognitive_map: CognitiveMap) -> OnMap:
@@ -35,8 +36,9 @@ def split_by_map(score: LocalizationScore, poses_m: FloatArray, cognitive_map: C
     right = score.localized & (errors_m <= FALSE_FIX_M)
     first = int(np.argmax(right)) if right.any() else len(right)
     declared = score.localized & (np.arange(len(right)) >= first)
-    after_m = float(mapped_way_m(poses_m, mapped)[first]) if right.any() else None
-    return OnMap(after_m, errors_m[declared & mapped], errors_m[declared & ~mapped], len(right) - first)
+    way_m = mapped_way_m(poses_m, mapped)
+    after_m = float(way_m[first]) if right.any() else None
+    return OnMap(after_m, errors_m[declared & mapped], errors_m[declared & ~mapped], len(right) - first, float(way_m[-1]))
 
 
 def on_mapped_road(poses_m: FloatArray, cognitive_map: CognitiveMap) -> NDArray[np.bool_]:

@@ -34,12 +34,12 @@ ELSEWHERE: Final = "another town"  # whatever is declared there is false
 WITHIN_M: Final = 200.0  # a start counts as a success if the localizer is right within this distance
 ERROR_RANGE_M: Final = (0.2, 20.0)  # of the heat map's colours: below is the map's own error, above is a false fix
 DEFINITION: Final = (
-    f"success: declared localized, and within 20 m of the truth, before {WITHIN_M:g} m of mapped road are driven. Error: "
-    "position, declared steps on mapped road from then on, pooled over sequences; worst: the largest mean error of one sequence. "
-    "Off the map: share of the declared steps elsewhere, by dead reckoning, and their mean error, m. False: sequences with a "
-    "declared step more than 20 m wrong, on the map or off it. Localized: share of steps after the first fix that are declared. "
-    "NEES: per dimension (x, y, heading), 1 is calibrated. Sequences overlap where the drive is short; all conditions drive the "
-    f"same route. Mapped: {MAPPED}."
+    f"success: declared localized, and within 20 m of the truth, before {WITHIN_M:g} m of mapped road are driven; drives with less "
+    "mapped road than that and no fix are not judged. Error: position, declared steps on mapped road from then on, pooled over "
+    "sequences; worst: the largest mean error of one sequence. Off the map: share of the declared steps elsewhere, by dead "
+    "reckoning, and their mean error, m. False: sequences with a declared step more than 20 m wrong, on the map or off it. "
+    "Localized: share of steps after the first fix that are declared. NEES: per dimension (x, y, heading), 1 is calibrated. "
+    f"Sequences overlap where the drive is short; all conditions drive the same route. Mapped: {MAPPED}."
 )
 HEADINGS: Final = (
     "condition", "success", "error mean / p95 / worst, m", "localized after median / max, m", "off the map, error", "false",
@@ -67,8 +67,12 @@ class SequenceResult:
         return self.on_map.localized_after_m
 
     @property
-    def success(self) -> bool:
-        return self.localized_after_m is not None and self.localized_after_m <= WITHIN_M
+    def success(self) -> bool | None:
+        """None: there was too little mapped road to tell."""
+        after_m = self.localized_after_m
+        if after_m is None and self.on_map.way_m < WITHIN_M:
+            return None
+        return after_m is not None and after_m <= WITHIN_M
 
     @property
     def localized_share(self) -> float | None:
@@ -92,7 +96,7 @@ class ConditionResult:
     @property
     def failures(self) -> list[SequenceResult]:
         """Sequences with a false fix or, in the mapped town, without a right one in time."""
-        return [one for one in self.sequences if one.false_fixes > 0 or (self.name != ELSEWHERE and not one.success)]
+        return [one for one in self.sequences if one.false_fixes > 0 or (self.name != ELSEWHERE and one.success is False)]
 
     def summary(self) -> dict[str, Any]:
         """The row of the table; figures without a sample are None."""
@@ -105,11 +109,13 @@ def pooled(sequences: Sequence[SequenceResult]) -> dict[str, Any]:
     off_map_m = np.concatenate([sequence.on_map.off_map_errors_m for sequence in sequences])
     after_m = [sequence.localized_after_m for sequence in sequences if sequence.localized_after_m is not None]
     declared, steps = len(errors_m) + len(off_map_m), sum(sequence.on_map.steps for sequence in sequences)
+    judged = [sequence.success for sequence in sequences if sequence.success is not None]
     means_m = [mean for sequence in sequences if (mean := sequence.error_mean_m) is not None]
     nees = [(sequence.nees, sequence.declared) for sequence in sequences if sequence.nees is not None]
     return {
         "sequences": len(sequences),
-        "success_share": float(np.mean([sequence.success for sequence in sequences])),
+        "judged": len(judged),
+        "success_share": float(np.mean(judged)) if judged else None,
         "error_mean_m": _mean(errors_m),
         "error_p95_m": float(np.percentile(errors_m, 95.0)) if len(errors_m) else None,
         "worst_sequence_mean_m": max(means_m, default=None),
@@ -220,7 +226,7 @@ def yardsticks(results: Sequence[ConditionResult]) -> str:
 
 def _cells(row: dict[str, Any]) -> list[str]:
     return [
-        f"{100 * row['success_share']:.0f} %",
+        "-" if row["success_share"] is None else f"{100 * row['success_share']:.0f} % of {row['judged']}",
         _figures(row, "error_mean_m", "error_p95_m", "worst_sequence_mean_m"),
         _figures(row, "localized_after_median_m", "localized_after_max_m"),
         f"{_percent(row['off_map_share'])}, {_figures(row, 'off_map_error_mean_m')}",

@@ -45,3 +45,4 @@ def test_errors_off_the_map_are_kept_apart_by_hand():
     assert_allclose(found.errors_m, np.ones(int(mapped.sum())))
     assert_allclose(found.off_map_errors_m, np.full(int((~mapped[21:]).sum()), 5.0))
     assert found.steps == 19
+    assert found.way_m == mapped.sum()

@@ -101,9 +101,9 @@ def test_sequences_are_spread_evenly_over_the_drive(tmp_path):
         cuts(straight_drive(tmp_path, SEQUENCE_M - 1), 2)
 
 
-def sequence(after_m=10.0, errors_m=(1.0, 3.0), false_fixes=0, nees=1.0, number=1):
+def sequence(after_m=10.0, errors_m=(1.0, 3.0), false_fixes=0, nees=1.0, number=1, way_m=300.0):
     steps = 0 if after_m is None else len(errors_m) + 1
-    on_map = OnMap(after_m, np.array(errors_m), np.zeros(0), steps)
+    on_map = OnMap(after_m, np.array(errors_m), np.zeros(0), steps, way_m)
     return SequenceResult(number, (0.0, 0.0, 0.0), on_map, false_fixes, 0.0, len(errors_m), nees, 0.2, 0.8)
 
 
@@ -129,9 +129,14 @@ def test_summary_by_hand():
     assert ConditionResult(ELSEWHERE, (sequence(None, (), nees=None),)).failures == []
 
 
+def test_a_start_without_mapped_road_is_not_judged():
+    result = ConditionResult("fog", (sequence(), sequence(None, (), nees=None, way_m=40.0)))
+    assert (result.summary()["success_share"], result.summary()["judged"], result.failures) == (1.0, 1, [])
+
+
 def test_a_condition_without_any_fix_is_a_row_all_the_same(tmp_path, capsys):
     results = [ConditionResult("same", (sequence(), sequence())), ConditionResult("night", (sequence(None, (), nees=None),) * 2)]
-    assert "| night | 0 % | - / - / - | - / - | -, - | 0 of 2 | - |" in markdown("town", results)
+    assert "| night | 0 % of 2 | - / - / - | - / - | -, - | 0 of 2 | - |" in markdown("town", results)
     report(tmp_path, "town", findings(*results))
     written = json.loads((tmp_path / "robustness.json").read_text())
     assert written["conditions"][1]["error_mean_m"] is None
@@ -149,7 +154,7 @@ def test_failures_say_how_to_run_them_again_and_the_yardsticks_have_rows(tmp_pat
     text = (tmp_path / "robustness.md").read_text()
     assert "start 7: 1 false fixes; again: `--conditions same --start 7`" in text
     assert text.count("--start") == 1  # a yardstick's failures are its own
-    assert "| kalman | 100 % | 25.00 / 25.00 / 25.00 |" in text
+    assert "| kalman | 100 % of 1 | 25.00 / 25.00 / 25.00 |" in text
     assert "| 1 | 372.7 | - | - | - | - | - | the localization drive is 300 m long" in text
     capsys.readouterr()
 

@@ -35,8 +35,8 @@ WITHIN_M: Final = 200.0  # a start counts as a success if the localizer is right
 ERROR_RANGE_M: Final = (0.2, 20.0)  # of the heat map's colours: below is the map's own error, above is a false fix
 DEFINITION: Final = (
     f"success: declared localized, and within 20 m of the truth, before {WITHIN_M:g} m of mapped road are driven; drives "
-    "without a fix and with less mapped road are not judged. Error: position, declared steps on mapped road from then on, over all "
-    "sequences; worst: the largest mean error of one sequence. Off the map: share of the declared steps elsewhere, by dead "
+    "without a fix and with less mapped road are not judged. Error: position, declared steps on mapped road from then on, of "
+    "all sequences; worst: the largest mean error of one sequence. Off the map: share of the declared steps elsewhere, by dead "
     "reckoning, and their mean error, m. False: sequences with a declared step more than 20 m wrong, on the map or off it. "
     "Localized: share of steps after the first fix that are declared. NEES: per dimension (x, y, heading), 1 is calibrated. "
     f"Sequences overlap where the drive is short; all conditions drive the same route. Mapped: {MAPPED}."

@@ -12,8 +12,8 @@ To localize, the tracker maps until it has merged with the loaded map, and track
 mode from the first frame it searches its own new and empty map only.
 
 A loop that closes while the last one's global bundle adjustment runs should end that one, but the flag that says so is taken back
-at once, and it often runs on: late in a long drive five grow side by side, for 9 GB and three times the CPU. So a frame waits
-while more than one is running, which no vehicle could; the tracker gets its corrections all the same, sooner and cheaper.
+at once, and it often runs on: late in a long drive five ran side by side, for 9 GB. So a frame waits while more than one is
+running, which no vehicle could; the tracker gets all its corrections, and sooner.
 """
 
 import json

@@ -27,6 +27,7 @@ class Workers:
 
     executor: ProcessPoolExecutor
     progress: Progress
+    processes: int
 
     def run(
         self,
@@ -63,7 +64,7 @@ class Workers:
 def worker_pool(workers: int) -> Iterator[Workers]:
     """``workers`` processes with a progress display."""
     with process_pool(workers) as executor, progress_bar() as progress:
-        yield Workers(executor, progress)
+        yield Workers(executor, progress, workers)
 
 
 @contextmanager

@@ -10,10 +10,6 @@ optimisation), and, last of all, ``result.json``: without it the run did not end
 
 To localize, the tracker maps until it has merged with the loaded map, and tracks in that map alone from then on: in localization
 mode from the first frame it searches its own new and empty map only.
-
-A loop that closes while the last one's global bundle adjustment runs should end that one, but the flag that says so is taken back
-at once, and it often runs on: late in a long drive five ran side by side, for 9 GB. So a frame waits while more than one is
-running, which no vehicle could; the tracker gets all its corrections, and sooner.
 """
 
 import json
@@ -27,7 +23,6 @@ import numpy as np
 from pyorbslam3 import Sensor, Slam
 
 SETTLE_S = 5.0  # for local mapping and loop closing, which run behind the tracker
-POLL_S = 0.02
 
 
 def main() -> None:
@@ -38,7 +33,6 @@ def main() -> None:
     live: list[str] = []
     steps: list[str] = []
     first_t_s, longest_s, merged = None, 0.0, False
-    threads = None  # that always run: none optimises globally after the first frame
     while (pair := read_pair(sys.stdin.buffer, job["width"], job["height"])) is not None:
         t_s, left, right = pair
         first_t_s = t_s if first_t_s is None else first_t_s
@@ -47,9 +41,6 @@ def main() -> None:
         asked = time.monotonic()
         result = slam.track_stereo(left, right, t_s)
         longest_s = max(longest_s, time.monotonic() - asked)
-        threads = running_threads() if threads is None else threads
-        while running_threads() > threads + 1:
-            time.sleep(POLL_S)
         steps.append(f"{t_s!r} {int(result.ok)} {int(merged)} {cpu_s() - loaded_s:.6f}")
         if result.ok:
             live.append(tum_line(t_s, np.asarray(result.pose_wc, dtype=np.float64)))
@@ -105,11 +96,6 @@ def quaternion(r: np.ndarray) -> tuple[float, float, float, float]:
     ])  # fmt: skip
     x, y, z, w = np.linalg.eigh(k)[1][:, -1]
     return float(x), float(y), float(z), float(w)
-
-
-def running_threads() -> int:
-    """Of this process."""
-    return sum(1 for _ in Path("/proc/self/task").iterdir())
 
 
 def cpu_s() -> float:

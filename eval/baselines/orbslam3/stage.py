@@ -23,8 +23,7 @@ from hippodrome.sim.scenario import Scenario
 STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5, "grain": True}
 
 
-TRACKER_BYTES = 6_000_000_000  # of memory, at the end of the paper's drive
-MOST_SIDE_BY_SIDE = 3
+TRACKER_BYTES = 10_000_000_000  # of memory, late in the paper's drive, when several global bundle adjustments overlap
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +66,7 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
     folders = [out / scenario.name / "orb-slam3" / how / f"run-{number}" for number in range(options.runs)]
     tasks = [RunTask(python, vocabulary, drive, folder, options.paced, options.limit_s) for folder in folders]
     print(f"ORB-SLAM3: {options.runs} runs of {drive.frames:,} stereo pairs", flush=True)
-    with process_pool(_side_by_side(options.runs)) as executor:
+    with process_pool(_side_by_side(options.runs, pool)) as executor:
         runs = replace(pool, executor=executor).run("track", run_tracker, tasks)
     found = rows(runs, drive)
     chosen = (found[-1].model_extra or {}).get("median_run")
@@ -77,10 +76,10 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
     return Tracked(found)
 
 
-def _side_by_side(runs: int) -> int:
-    """Runs at once: on few cores too, as a frame often waits for its run's back end, and the last of several would run alone."""
+def _side_by_side(runs: int, pool: Workers) -> int:
+    """Runs at once: as many as the pool has processes, if memory has room for them."""
     available_bytes = 1024 * int(Path("/proc/meminfo").read_text().split("MemAvailable:")[1].split()[0])
-    return max(1, min(runs, MOST_SIDE_BY_SIDE, available_bytes // TRACKER_BYTES))
+    return max(1, min(runs, pool.processes, available_bytes // TRACKER_BYTES))
 
 
 def locate(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> list[Located]:

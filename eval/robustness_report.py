@@ -271,7 +271,10 @@ def draw_heat_map(path: Path, name: str, results: Sequence[ConditionResult]) -> 
             _cell(axes, column, row, sequence)
     axes.set_yticks(range(len(results)), [result.name for result in results], fontsize=8)
     axes.set_xticks(range(errors_m.shape[1]), [str(column + 1) for column in range(errors_m.shape[1])], fontsize=8)
-    axes.set_xlabel("unknown start along the drive; figures: metres until localized, x: never, red: a false fix", fontsize=8)
+    legend = (
+        "unknown start along the drive; figures: metres until localized, x: never,\n-: too little mapped road, red: a false fix"
+    )
+    axes.set_xlabel(legend, fontsize=8)
     axes.set_title(f"{name}: localization under other conditions", loc="left", fontsize=10)
     save_figure(figure, path)
 
@@ -281,7 +284,8 @@ def _cell(axes: Axes, column: int, row: int, sequence: SequenceResult) -> None:
     bad = sequence.false_fixes > 0
     dark = sequence.error_mean_m is not None and sequence.error_mean_m > 2.0  # the upper half of the colours
     colour = VERMILION if bad else "white" if dark else TRUTH
-    axes.text(column, row, "x" if after_m is None else f"{after_m:.0f}", ha="center", va="center", fontsize=7, color=colour,
+    never = "-" if sequence.success is None else "x"
+    axes.text(column, row, never if after_m is None else f"{after_m:.0f}", ha="center", va="center", fontsize=7, color=colour,
               fontweight="bold" if bad else "normal")  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import sys
 from importlib import import_module
 
 from benchmarks.table import Row, table
+from hippodrome.eval.pool import one_opencv_thread
 
 NAMES = ("render", "mapping", "localization", "matching", "scaling")
 
@@ -18,6 +19,7 @@ def main(names: list[str]) -> int:
     if unknown:
         print(f"no benchmark named {', '.join(unknown)}; there are: {', '.join(NAMES)}", file=sys.stderr)
         return 2
+    one_opencv_thread()  # as in the commands
     rows: list[Row] = []
     for name in names or NAMES:
         print(f"running {name} ...", file=sys.stderr, flush=True)

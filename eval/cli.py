@@ -15,6 +15,7 @@ from hippodrome.eval.commands.runs import add_run_commands
 from hippodrome.eval.commands.stages import add_stage_commands
 from hippodrome.eval.commands.sweep import add_sweep_command
 from hippodrome.eval.commands.trials import add_trial_commands
+from hippodrome.eval.pool import one_opencv_thread
 
 EPILOG = """\
 examples:
@@ -34,6 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of the command ``hippodrome``."""
     options = _parser().parse_args(arguments)
     command: Callable[[argparse.Namespace], int] = options.command
+    one_opencv_thread()
     try:
         return command(options)
     except HippodromeError as error:

@@ -137,7 +137,8 @@ class Localizer:
         noise, pose = self._config.injection, self._recogniser.pose(seen)
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        along_m = localizer_places.LINK_REACH_M if self._places.end[seen.cell] else noise.along_m
+        at_end = self._places.end[seen.cell]  # from as far beyond as two cells may be linked, it is still what looks most alike
+        along_m = localizer_places.LINK_REACH_M if at_end else noise.along_m
         return Injection(pose, turn @ np.diag([along_m**2, noise.across_m**2, noise.heading_rad**2]) @ turn.T)
 
     def _reactivate(self, injection: Injection) -> None:

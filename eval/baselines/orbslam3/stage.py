@@ -21,8 +21,6 @@ from hippodrome.sim.scenario import Scenario
 
 # The size and about the baseline of the published car data sets. Without grain most of a street's surface has no corner to track.
 STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5, "grain": True}
-
-
 TRACKER_BYTES = 10_000_000_000  # of memory, late in the paper's drive, when several global bundle adjustments overlap
 
 

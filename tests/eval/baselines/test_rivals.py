@@ -1,12 +1,15 @@
 """The ablation changes nothing but what it leaves out; the stereo camera sees the same drive."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 from numpy.testing import assert_array_equal
 
 from hippodrome.core.mapper import MapperConfig, build_map
-from hippodrome.core.types import Observation
+from hippodrome.core.types import HippodromeError, Observation
 from hippodrome.eval.baselines.orbslam3.stage import stereo_scenario
-from hippodrome.eval.baselines.rivals import map_without_attractor, run_ratslam, save_ratslam
+from hippodrome.eval.baselines.rivals import _ratslam, map_without_attractor, run_ratslam, save_ratslam
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.record import RecordingPlan, prepare
 from hippodrome.sim.scenario import DriveSpec, Scenario
@@ -66,3 +69,8 @@ def test_the_stereo_camera_sees_the_same_drive(tmp_path):
     assert plans[0].folder() != plans[1].folder()
     drives = [(plan.folder() / "drive.npz").read_bytes() for plan in plans]
     assert drives[0] == drives[1]
+
+
+def test_a_drive_too_long_for_ratslam_is_a_row_that_says_so():
+    with pytest.raises(HippodromeError, match="not run: the drive takes 4000 s"):
+        _ratslam(SimpleNamespace(duration_s=4000.0), np.zeros(1))

@@ -17,6 +17,7 @@ QUOTED_MARK = "†"
 QUOTED_NOTE = f"{QUOTED_MARK} quoted from the paper, another drive in another simulator; not measured here"
 NONE = "-"
 MEGABYTE = 1e6
+LEAST = 0.001  # the smallest figure that a table writes out
 
 Cell: TypeAlias = Callable[[Row], str]
 
@@ -28,10 +29,12 @@ class Column:
 
 
 def _figure(value: float | None, digits: int = 2) -> str:
-    """A number with ``digits`` decimals, or significant digits if it is smaller than one of them."""
+    """A number with ``digits`` decimals; a smaller one with one significant digit, down to what no reader needs."""
     if value is None:
         return NONE
-    return f"{value:.{digits}f}" if value == 0.0 or abs(value) >= 10.0**-digits else f"{value:.1g}"
+    if value == 0.0 or abs(value) >= 10.0**-digits:
+        return f"{value:.{digits}f}"
+    return f"{value:.1g}" if abs(value) >= LEAST else f"<{LEAST}"
 
 
 def _count(value: int | None) -> str:

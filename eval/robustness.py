@@ -1,4 +1,4 @@
-"""``hippodrome robustness``: one map, localized in under many conditions, each from several unknown starts."""
+"""``hippodrome robustness``: a map of each town, localized in under many conditions, each from several unknown starts."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from hippodrome.eval.mapped_road import split_by_map
 from hippodrome.eval.materials import refine_config
 from hippodrome.eval.metrics import path_length_m
 from hippodrome.eval.place_recognition import half_known, looks_of, recognise
-from hippodrome.eval.pool import worker_pool
+from hippodrome.eval.pool import Workers, worker_pool
 from hippodrome.eval.robustness_cases import Kidnapping, PaperSequence, kidnappings, paper_sequences
 from hippodrome.eval.robustness_conditions import CONDITIONS, SAME, chosen
 from hippodrome.eval.robustness_places import PlaceResult
 from hippodrome.eval.robustness_report import ELSEWHERE, ConditionResult, Findings, SequenceResult, markdown, report
-from hippodrome.eval.run import make_recordings
-from hippodrome.eval.scenario_files import read_scenario
+from hippodrome.eval.robustness_towns import report_towns
+from hippodrome.eval.run import load_scenarios, make_recordings
 from hippodrome.eval.stages import localize_recording, map_recording, refine_map
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.record import RecordingPlan, finish
@@ -53,7 +53,7 @@ class Task:
 class Request:
     """What the command line asks for."""
 
-    scenario: Path
+    scenarios: Sequence[Path]
     conditions: Sequence[str] | None
     sequences: int
     only: int | None  # number of the only start to run, from 1: a failure seen again
@@ -63,31 +63,39 @@ class Request:
 
 
 def robustness(request: Request) -> None:
-    """Record, map once, localize under each condition; writes ``robustness.json``, ``.md`` and figures below ``out/<name>``."""
-    conditions, out = chosen(request.conditions), request.out
-    scenario = read_scenario(request.scenario)
+    """Each town's files below ``out/<name>``; with several towns, all of them pooled in ``out``."""
+    scenarios = load_scenarios(request.scenarios, None, None)
+    conditions = chosen(request.conditions)
     if request.only is not None and request.only > request.sequences:
         raise HippodromeError(f"--start {request.only}: there are {request.sequences} starts, see --sequences")
     require_gl()
-    starts = request.sequences, request.only
+    with worker_pool(request.workers) as pool:
+        towns = {one.name: found for one in scenarios if (found := _town(one, conditions, request, pool)) is not None}
+    if len(towns) > 1:
+        report_towns(request.out, towns)
+
+
+def _town(scenario: Scenario, conditions: Sequence[str], request: Request, pool: Workers) -> Findings | None:
+    """Record, map once, localize under each condition, report. None: only one start was asked for, and is printed."""
+    out, starts = request.out, (request.sequences, request.only)
     tasks = [Task(name, CONDITIONS[name](scenario), scenario, out, starts) for name in conditions]
     away = Task(ELSEWHERE, elsewhere(scenario), scenario, out, starts)
     plans = [RecordingPlan(task.scenario, "localization", out) for task in [*tasks, away]]
-    with worker_pool(request.workers) as pool:
-        make_recordings([RecordingPlan(scenario, "mapping", out), *plans], pool)
-        pool.run("map", _build_map, [(scenario, out)])
-        by_mode = [replace(task, mode=mode) for mode in request.modes for task in tasks]
-        results = pool.run("localize", _localize, [*by_mode, away])
-        if request.only is not None:
-            print(markdown(scenario.name, results))
-            return
-        places = pool.run("places", _recognise, tasks)
-        kidnapped = pool.run("kidnap", _kidnap, tasks)
-        paper = pool.run("lengths", _paper_lengths, tasks[:1])
+    make_recordings([RecordingPlan(scenario, "mapping", out), *plans], pool)
+    pool.run("map", _build_map, [(scenario, out)])
+    by_mode = [replace(task, mode=mode) for mode in request.modes for task in tasks]
+    results = pool.run("localize", _localize, [*by_mode, away])
+    if request.only is not None:
+        print(markdown(scenario.name, results))
+        return None
+    places = pool.run("places", _recognise, tasks)
+    kidnapped = dict(zip(conditions, pool.run("kidnap", _kidnap, tasks), strict=True))
+    paper = pool.run("lengths", _paper_lengths, tasks[:1])[0]
     path = map_path(scenario, out)
-    bytes_per_view = path.stat().st_size / len(load_map(path)[0].view_cells.templates)
-    by_condition = dict(zip(conditions, kidnapped, strict=True))
-    report(out / scenario.name, scenario.name, Findings(results, places, by_condition, paper[0], bytes_per_view))
+    views = len(load_map(path)[0].view_cells.templates)
+    found = Findings(results, places, kidnapped, paper, path.stat().st_size, views)
+    report(out / scenario.name, scenario.name, found)
+    return found
 
 
 def elsewhere(scenario: Scenario) -> Scenario:

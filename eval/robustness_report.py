@@ -137,7 +137,12 @@ class Findings:
     places: Sequence[PlaceResult]
     kidnapped: dict[str, tuple[Kidnapping, ...]]  # by condition
     paper: tuple[PaperSequence, ...]
-    bytes_per_view: float
+    map_bytes: int  # on disk
+    views: int  # in the map
+
+    @property
+    def bytes_per_view(self) -> float:
+        return self.map_bytes / self.views
 
     @property
     def conditions(self) -> list[ConditionResult]:

@@ -22,13 +22,23 @@ class Target:
     unit: str
 
     @property
+    def shortfall(self) -> float:
+        """By how much the figure is on the wrong side of what it must be; negative on the right side."""
+        assert self.value is not None
+        return self.value - self.must if self.most else self.must - self.value
+
+    @property
     def verdict(self) -> str:
         if self.value is None:
             return "not measured"
         sign = 1.0 if self.most else -1.0
         if sign * self.value <= sign * self.aim:
             return "aim reached"
-        return "held" if sign * self.value <= sign * self.must else "MISSED"
+        return "held" if self.shortfall <= 0.0 else "MISSED"
+
+    @property
+    def figure(self) -> str:
+        return "-" if self.value is None else f"{self.value:.3g}"
 
 
 def targets(
@@ -61,7 +71,7 @@ def markdown(found: Sequence[Target]) -> str:
     """One row a target."""
     lines = ["## Against the targets", "", "| item | measured | must | aim | |", "|---|---|---|---|---|"]
     for target in found:
-        value = "-" if target.value is None else f"{target.value:.3g} {target.unit}"
+        value = target.figure if target.value is None else f"{target.figure} {target.unit}"
         lines.append(
             f"| {target.item} | {value} | {target.must:g} {target.unit} | {target.aim:g} {target.unit} | {target.verdict} |"
         )

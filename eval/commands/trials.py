@@ -24,7 +24,7 @@ def add_trial_commands(commands: Any) -> None:
     robust = commands.add_parser(
         "robustness", help="localize under other light, weather, traffic and noise", description=_robustness.__doc__
     )
-    robust.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="its mapping drive is mapped")
+    robust.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.yaml", help="its mapping drive is mapped")
     robust.add_argument("--conditions", nargs="+", metavar="NAME", help="some of the conditions only (default: all)")
     robust.add_argument("--sequences", type=positive, default=8, metavar="N", help="unknown starts per condition (default: 8)")
     robust.add_argument("--start", type=positive, metavar="N", help="only this start of each condition: a failure, run again")
@@ -59,12 +59,12 @@ def _stress(options: argparse.Namespace) -> int:
 
 
 def _robustness(options: argparse.Namespace) -> int:
-    """Map once, then localize from several unknown starts under each of many conditions; writes a table and a heat map."""
+    """Map each town once, then localize from several unknown starts under each of many conditions; tables and a heat map."""
     from hippodrome.eval.robustness import Request, robustness
 
     modes = list(dict.fromkeys(["default", *options.modes]))
     robustness(
-        Request(options.scenario, options.conditions, options.sequences, options.start, modes, options.workers, options.out)
+        Request(options.scenarios, options.conditions, options.sequences, options.start, modes, options.workers, options.out)
     )
     return DONE
 

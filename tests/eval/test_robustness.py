@@ -23,6 +23,7 @@ from hippodrome.eval.robustness_conditions import CONDITIONS, SAME, chosen
 from hippodrome.eval.robustness_places import PlaceResult
 from hippodrome.eval.robustness_report import ELSEWHERE, ConditionResult, Findings, SequenceResult, markdown, report
 from hippodrome.eval.robustness_targets import Target
+from hippodrome.eval.robustness_towns import merged, report_towns
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import DriveSpec, Scenario
@@ -112,7 +113,7 @@ def findings(*results):
     answers = Answers("sequence of views", np.array([3.0, 2.0, 1.0]), right, right, right)
     paper = PaperSequence(1, 372.7, "the localization drive is 300 m long, the sequence 372.7 m")
     places = [PlaceResult(results[0].name, (answers,))]
-    return Findings(results, places, {results[0].name: (Kidnapping(30.0, 5.0),)}, (paper,), 834.0)
+    return Findings(results, places, {results[0].name: (Kidnapping(30.0, 5.0),)}, (paper,), 8340, 10)
 
 
 def test_summary_by_hand():
@@ -197,3 +198,21 @@ def test_kidnappings_without_recovery_count_as_infinitely_far():
     assert (row["recovered"], row["recovered_after_median_m"], row["wrong_until_max_m"]) == (2, 40.0, 150.0)
     assert kidnapping_summary([Kidnapping(None, 9.0)])["recovered_after_median_m"] is None
     assert paper_summary([PaperSequence(1, 372.7, "too short")])["error_mean_m"] is None
+
+
+def test_towns_are_pooled_from_samples_and_the_worst_is_seen(tmp_path, capsys):
+    good = findings(ConditionResult("same", (sequence(errors_m=(0.5, 0.5, 0.5)),)))
+    bad = findings(ConditionResult("same", (sequence(errors_m=(4.5,)), sequence(None, ()))))
+    pooled = merged([good, bad])
+    row = pooled.conditions[0].summary()
+    assert row["error_mean_m"] == 1.5  # of four samples, not of two means
+    assert row["sequences"] == 3
+    assert pooled.places[0].summary()["looks"] == 6
+    assert pooled.bytes_per_view == 834.0
+    assert len(pooled.kidnapped["same"]) == 2
+    report_towns(tmp_path, {"grid": good, "rural": bad})
+    said = capsys.readouterr().out
+    assert "| success within 200 m, same condition | 100 | 50 | 66.7 % | 95 | 99 | MISSED | MISSED |" in said
+    assert "| recovery after kidnapping, median of all | 30 | 30 | 30 m | 100 | 40 | aim reached | aim reached |" in said
+    assert json.loads((tmp_path / "robustness.json").read_text())["towns"]["rural"]["success within 200 m, same condition"] == 50
+    assert (tmp_path / "robustness.png").stat().st_size > 500

@@ -17,6 +17,7 @@ from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.exchange.foreign import ForeignDrive, ForeignFrame, Motion, motion_table, trajectory_of
 from hippodrome.eval.exchange.poses import Axes
 from hippodrome.eval.exchange.readers.raw_image import png_of
+from hippodrome.eval.exchange.readers.spool import Spool
 from hippodrome.eval.exchange.source import ExchangeError
 
 IMAGES = ("foxglove.CompressedImage", "foxglove.RawImage")
@@ -34,7 +35,8 @@ def read_mcap(path: Path, axes: Axes) -> ForeignDrive:
                 raise ExchangeError(f"{path}: no topic of {' or '.join(IMAGES)}; it has: {_listed(topics)}")
             odometry = next((topic for topic, kind in topics.items() if kind == ODOMETRY), None)
             truth = next((topic for topic in TRUTH_TOPICS if topics.get(topic) in (POSE, ODOMETRY)), None)
-            frames = [_frame(path, images, stamp, message) for stamp, message in _messages(stream, images)]
+            spool = Spool()
+            frames = [_frame(path, images, stamp, message, spool) for stamp, message in _messages(stream, images)]
             motion = _motion(path, odometry, list(_messages(stream, odometry))) if odometry else None
             poses = _poses(path, truth, list(_messages(stream, truth)), axes) if truth else None
     except OSError as error:
@@ -64,12 +66,12 @@ def _messages(stream: Any, topic: str) -> Iterator[tuple[int, Any]]:
         yield stamp or decoded.message.log_time, message
 
 
-def _frame(path: Path, topic: str, stamp: int, message: Any) -> ForeignFrame:
+def _frame(path: Path, topic: str, stamp: int, message: Any, spool: Spool) -> ForeignFrame:
     name = f"{path}: {topic} at {stamp} ns"
     if hasattr(message, "format"):
-        return ForeignFrame(stamp / 1e9, name, lambda: bytes(message.data))
+        return ForeignFrame(stamp / 1e9, name, spool.keep(bytes(message.data)))
     png = png_of(message.data, message.encoding, message.width, message.height, message.step, name)
-    return ForeignFrame(stamp / 1e9, name, lambda: png)
+    return ForeignFrame(stamp / 1e9, name, spool.keep(png))
 
 
 def _motion(path: Path, topic: str, messages: list[tuple[int, Any]]) -> Motion:

@@ -15,6 +15,7 @@ from hippodrome.core.types import Trajectory
 from hippodrome.eval.exchange.foreign import ForeignDrive, ForeignFrame, Motion, motion_table, trajectory_of
 from hippodrome.eval.exchange.poses import Axes
 from hippodrome.eval.exchange.readers.raw_image import png_of
+from hippodrome.eval.exchange.readers.spool import Spool
 from hippodrome.eval.exchange.source import ExchangeError
 
 COMPRESSED, RAW = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"
@@ -33,7 +34,8 @@ def read_rosbag(path: Path, axes: Axes) -> ForeignDrive:
                 raise ExchangeError(f"{path}: no topic of {COMPRESSED} or {RAW}; it has: {listed}")
             truth = next((topic for topic in TRUTH_TOPICS if topics.get(topic) in (POSE, ODOMETRY)), None)
             odometry = next((topic for topic, kind in topics.items() if kind == ODOMETRY and topic != truth), None)
-            frames = [_frame(path, images, stamp, message) for stamp, message in _messages(bag, images)]
+            spool = Spool()
+            frames = [_frame(path, images, stamp, message, spool) for stamp, message in _messages(bag, images)]
             motion = _motion(path, odometry, list(_messages(bag, odometry))) if odometry else None
             poses = _poses(path, truth, list(_messages(bag, truth)), axes) if truth else None
     except (AnyReaderError, OSError, struct.error, ValueError, KeyError, TypeError, IndexError, MemoryError, EOFError) as error:
@@ -50,12 +52,12 @@ def _messages(bag: AnyReader, topic: str) -> Iterator[tuple[int, Any]]:
         yield stamp or recorded, message
 
 
-def _frame(path: Path, topic: str, stamp: int, message: Any) -> ForeignFrame:
+def _frame(path: Path, topic: str, stamp: int, message: Any, spool: Spool) -> ForeignFrame:
     name = f"{path}: {topic} at {stamp} ns"
     if hasattr(message, "format"):
-        return ForeignFrame(stamp / 1e9, name, lambda: bytes(message.data))
+        return ForeignFrame(stamp / 1e9, name, spool.keep(bytes(message.data)))
     png = png_of(bytes(message.data), message.encoding, message.width, message.height, message.step, name)
-    return ForeignFrame(stamp / 1e9, name, lambda: png)
+    return ForeignFrame(stamp / 1e9, name, spool.keep(png))
 
 
 def _motion(path: Path, topic: str, messages: list[tuple[int, Any]]) -> Motion:

@@ -17,6 +17,7 @@ from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
 from hippodrome.eval.exchange.foreign import ForeignFrame, Motion, decode, motion_of, truth_at
 from hippodrome.eval.exchange.importing import _samples
 from hippodrome.eval.exchange.readers.raw_image import png_of
+from hippodrome.eval.exchange.readers.spool import Spool
 from hippodrome.eval.exchange.source import ExchangeError, truth_of
 from hippodrome.eval.trajectory_io import read_tum, write_tum
 from hippodrome.sim.recording import open_recording
@@ -139,6 +140,15 @@ def test_score_prints_our_figures(run, exported, tmp_path, capsys):
     estimate, truth = read_tum(run.scenario / "topometric.tum"), run.mapping.ground_truth()
     errors_m = np.hypot(*(estimate.poses - se2.interpolate(truth.t_s, truth.poses, estimate.t_s))[:, :2].T)
     assert lines[0].startswith(f"mean {errors_m.mean():.3f} m")
+
+
+@given(images=st.lists(st.binary(max_size=50), max_size=8), order=st.randoms(use_true_random=False))
+@settings(max_examples=30, deadline=None)
+def test_images_come_back_from_disk_in_any_order(images, order):
+    spool = Spool()
+    kept = [(image, spool.keep(image)) for image in images]
+    order.shuffle(kept)
+    assert all(load() == image for image, load in kept)
 
 
 BOMB = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x00\x00\xff\xff\x00\x00\xff\xff\x08\x02\x00\x00\x00\x00\x00\x00\x00"

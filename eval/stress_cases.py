@@ -12,7 +12,8 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS, NoiseLevel, SelfMotionNoise
-from hippodrome.sim.town import CONVERT_OPTIONS, TownSpec, run_tool
+from hippodrome.sim.sumo_tools import run_tool
+from hippodrome.sim.town import CONVERT_OPTIONS, TownSpec
 
 MISSING_ROADS = 2  # driven streets taken out of the network, both directions each
 FOREIGN_SEED = 1_000_003  # added to a town's own: a town of the same kind, where the drive never was

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 import re
-import subprocess
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from itertools import product
@@ -14,17 +12,17 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
-import sumo
 from pydantic import Field
 
-from hippodrome.core.types import FloatArray, HippodromeError
+from hippodrome.core.types import FloatArray
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
+from hippodrome.sim.map_import import import_map, import_recipe, is_foreign
 from hippodrome.sim.network import SumoNet, check_network, is_left_hand, load_net, road_network
 from hippodrome.sim.rural import rural_plan
 from hippodrome.sim.spec import Spec
+from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.types import Town
 
-TOOL_TIMEOUT_S: Final = 120.0  # netconvert takes 0.1 s for a generated town and some 10 s for a city
 LANE_WIDTH_M: Final = 3.2  # SUMO's default
 POLE_SETBACK_M: Final = 0.8  # signal poles stand this far outside the carriageway
 MIN_RING_M: Final = 40.0  # a narrower ring leaves no room for houses between the streets
@@ -39,7 +37,6 @@ CONVERT_OPTIONS: Final = (
     "--offset.disable-normalization=true",
     "--no-warnings=true",
 )
-CONVERTIBLE: Final = {".osm": "--osm-files", ".xodr": "--opendrive-files"}
 
 
 class TownSpec(Spec):
@@ -51,7 +48,7 @@ class TownSpec(Spec):
     road_km: float = Field(4.39, ge=0.8, le=500.0)  # directed: a two-way street counts twice
     lanes: int = Field(1, ge=1, le=2)  # per direction
     speed_limit_mps: float = Field(8.33, ge=3.0, le=40.0)
-    network: Path | None = None  # a .net.xml, .net.xml.gz, .osm or .xodr; overrides everything above
+    network: Path | None = None  # a .net.xml, .net.xml.gz, .osm or .xodr (also .gz); overrides everything above
 
 
 def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
@@ -79,26 +76,6 @@ def read_town(net_file: Path, name: str | None = None) -> Town:
         left_hand=left_hand,
         notes=check_network(net, network, net_file),
     )
-
-
-def sumo_binary(name: str) -> str:
-    """Path of one of the programs in the ``eclipse-sumo`` package."""
-    binary = Path(sumo.SUMO_HOME) / "bin" / (f"{name}.exe" if os.name == "nt" else name)
-    if not binary.is_file():
-        raise HippodromeError(f"{binary}: program missing; reinstall the Python package eclipse-sumo")
-    return str(binary)
-
-
-def run_tool(name: str, *options: str) -> None:
-    """Runs one of SUMO's programs; its complaint becomes the error."""
-    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-    command = [sumo_binary(name), *options]
-    try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=TOOL_TIMEOUT_S, check=False)
-    except subprocess.TimeoutExpired as error:
-        raise HippodromeError(f"{name}: no answer within {TOOL_TIMEOUT_S:.0f} s; make the network smaller") from error
-    if done.returncode != 0:
-        raise HippodromeError(f"{name} failed ({done.returncode}): {' '.join(done.stderr.split())[:500]}")
 
 
 def _plan(spec: TownSpec, rng_seed: int) -> Plan:
@@ -192,21 +169,12 @@ def _strip_comments(file: Path) -> None:
 
 
 def _imported(source: Path, work_dir: Path) -> Path:
-    """A SUMO network as it is; OpenStreetMap and OpenDRIVE maps converted once into ``work_dir``."""
-    option = CONVERTIBLE.get(source.suffix)
-    if option is None:
+    """A SUMO network as it is; maps of other makers imported once into ``work_dir``."""
+    if not is_foreign(source.name):
         return source
-    if not source.is_file():
-        raise HippodromeError(f"{source}: no such map file; give a .net.xml, .net.xml.gz, .osm or .xodr")
-    digest = hashlib.sha256(source.read_bytes()).hexdigest()[:12]
-    net_file = work_dir / f"{source.stem}-{digest}.net.xml"
+    net_file = work_dir / f"{source.name.partition('.')[0]}-{import_recipe(source)}.net.xml.gz"
     if not net_file.exists():
-        work_dir.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=work_dir) as folder:
-            net = Path(folder) / "map.net.xml"
-            run_tool("netconvert", f"{option}={source}", f"--output-file={net}", "--no-warnings=true")
-            _strip_comments(net)
-            net.replace(net_file)
+        import_map(source, net_file)
     return net_file
 
 

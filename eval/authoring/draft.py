@@ -13,10 +13,10 @@ import numpy as np
 import yaml
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.authoring.importing import IMPORTED, KNOWN, import_map
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.scenario_files import PACKAGE, located
 from hippodrome.proto.atomic import write_atomically
+from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import tour_graph
 from hippodrome.sim.town import TownSpec, build_town
@@ -142,7 +142,7 @@ def _tour_words(draft: Draft) -> str:
 
 
 def _is_imported(source: str) -> bool:
-    return source not in KINDS and source.endswith(IMPORTED)
+    return source not in KINDS and is_foreign(source)
 
 
 def _town(source: str, imported: Path | None, folder: Path) -> Town:

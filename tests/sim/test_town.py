@@ -13,7 +13,8 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.sim.generators import grid_plan, radial_plan, through_nodes
 from hippodrome.sim.network import drivable_edges, edge_lengths_m
 from hippodrome.sim.rural import MIN_RADIUS_M, rural_plan
-from hippodrome.sim.town import TownSpec, build_town, run_tool
+from hippodrome.sim.sumo_tools import run_tool
+from hippodrome.sim.town import TownSpec, build_town
 
 KINDS = ["rural", "grid", "radial", "random"]
 PLANS = {

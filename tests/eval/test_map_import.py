@@ -5,12 +5,13 @@ import gzip
 import pytest
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.authoring import importing
 from hippodrome.eval.authoring.check import check_scenario
 from hippodrome.eval.authoring.draft import draft_for, new_scenario
-from hippodrome.eval.authoring.importing import import_map
 from hippodrome.eval.scenario_files import read_scenario
-from hippodrome.sim.town import TownSpec, build_town, read_town, run_tool
+from hippodrome.sim import map_import
+from hippodrome.sim.map_import import import_map
+from hippodrome.sim.sumo_tools import run_tool
+from hippodrome.sim.town import TownSpec, build_town, read_town
 
 CORNERS = [(50.0, 8.0), (50.0, 8.004), (50.002, 8.004), (50.002, 8.0)]
 NODES = "".join(f'<node id="{i}" version="1" lat="{lat}" lon="{lon}"/>' for i, (lat, lon) in enumerate(CORNERS, 1))
@@ -65,7 +66,7 @@ def test_the_same_map_gives_the_same_bytes(tmp_path):
 
 
 def test_a_bomb_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(importing, "MAX_UNPACKED_BYTES", 1 << 20)
+    monkeypatch.setattr(map_import, "MAX_UNPACKED_BYTES", 1 << 20)
     source = tmp_path / "bomb.osm.gz"
     source.write_bytes(gzip.compress(bytes(3 << 20)))
     country = tmp_path / "country.osm.pbf"

@@ -1,16 +1,17 @@
-"""Maps of other makers into SUMO networks, once, when a scenario is written: OpenStreetMap (also packed) and OpenDRIVE."""
+"""Maps of other makers into SUMO networks: OpenStreetMap (also packed) and OpenDRIVE."""
 
 from __future__ import annotations
 
 import gzip
+import hashlib
 import tempfile
 import zlib
 from pathlib import Path
 from typing import Final
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.proto.atomic import write_atomically
-from hippodrome.sim.town import run_tool
+from hippodrome.sim.files import replacing, sha256_of
+from hippodrome.sim.sumo_tools import run_tool
 
 SUMO: Final = (".net.xml", ".net.xml.gz")
 OSM: Final = (".osm", ".osm.xml", ".osm.gz", ".osm.bz2", ".osm.pbf", ".pbf")
@@ -43,6 +44,18 @@ OPENDRIVE_OPTIONS: Final[tuple[str, ...]] = (
 )
 
 
+def is_foreign(name: str) -> bool:
+    """Whether a file of this name has to be imported."""
+    return name.endswith(IMPORTED)
+
+
+def import_recipe(source: Path) -> str:
+    """What the import of a map depends on, in twelve digits."""
+    if not source.is_file():
+        raise HippodromeError(f"{source}: no such file; give {', '.join(KNOWN)}")
+    return hashlib.sha256(repr((sha256_of(source), OSM_OPTIONS, OPENDRIVE_OPTIONS)).encode()).hexdigest()[:12]
+
+
 def import_map(source: Path, net_file: Path) -> None:
     """Write ``source`` as the SUMO network ``net_file`` (.net.xml.gz); the same map, the same bytes. Raises HippodromeError."""
     if not source.is_file():
@@ -53,7 +66,8 @@ def import_map(source: Path, net_file: Path) -> None:
         plain, made = Path(folder) / f"map{'.osm' if source.name.endswith(OSM) else '.xodr'}", Path(folder) / "made.net.xml"
         _unpack(source, plain)
         _convert(source, plain, made)
-        write_atomically(net_file, gzip.compress(_without_comments(made.read_text(encoding="utf-8")).encode(), mtime=0))
+        with replacing(net_file) as temporary:
+            temporary.write_bytes(gzip.compress(_without_comments(made.read_text(encoding="utf-8")).encode(), mtime=0))
 
 
 def _convert(source: Path, plain: Path, made: Path) -> None:

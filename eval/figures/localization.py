@@ -28,6 +28,7 @@ from hippodrome.eval.localization_score import FALSE_FIX_M, LocalizationScore
 
 SHEET_SIZE = 48
 RING_SIZE = 72
+PEAKED = 10.0  # times the mean: a network that has made up its mind
 
 
 def draw_localization_error(
@@ -98,7 +99,7 @@ def draw_localization_strip(
         picture, sheet = figure.add_subplot(grid[0, column]), figure.add_subplot(grid[1, column])
         picture.imshow(frame, cmap="gray")
         picture.set_title(f"{estimate.t_s - t_s[0]:.1f} s", fontsize=9, color=GREEN if estimate.localized else FAINT)
-        sheet.imshow(grid_sheet(estimate, module).T, origin="lower", cmap="magma", vmin=0.0)
+        _sheet(sheet, grid_sheet(estimate, module))
         ring = figure.add_subplot(grid[2, column], projection="polar")
         _ring(ring, estimate)
         for axes, name in ((picture, "frame"), (sheet, f"grid cells,\nmodule {module + 1}"), (ring, "head\ndirection")):
@@ -134,6 +135,15 @@ def _bump(angles: FloatArray, mean_rad: float, reliability: float) -> FloatArray
     bump = np.exp(max(reliability, 0.0) * (np.cos(angles - mean_rad) - 1.0))
     density: FloatArray = bump / bump.sum()
     return density
+
+
+def _sheet(axes: Axes, activity: FloatArray) -> None:
+    """A sure network's bump is smaller than a cell of the sheet: a circle shows where it is."""
+    axes.imshow(activity.T, origin="lower", cmap="magma", vmin=0.0)
+    if activity.max() > PEAKED * activity.mean():
+        x, y = np.unravel_index(int(activity.argmax()), activity.shape)
+        axes.autoscale(False)  # a circle at the border is cut, the sheet stays as large as its neighbours
+        axes.scatter([x], [y], s=90, facecolors="none", edgecolors="white", linewidths=0.9)
 
 
 def _ring(axes: Any, estimate: LocalizationEstimate) -> None:

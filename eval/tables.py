@@ -65,9 +65,18 @@ def _localization(row: Row, figure: Callable[..., str], field: str) -> str:
 
 
 def _runs(row: Row) -> str:
-    """Lowest and highest mean of a method that is not deterministic."""
+    """Lowest and highest mean of a method that is not deterministic, and how many of its runs came to nothing."""
     spread = (row.model_extra or {}).get("ape_spread_m")
-    return " to ".join(_figure(float(value)) for value in spread) if spread else NONE
+    if not spread:
+        return NONE
+    lost, runs = len(failed_runs(row)), len((row.model_extra or {}).get("runs", ()))
+    return " to ".join(_figure(float(value)) for value in spread) + (f" ({lost} of {runs} failed)" if lost else "")
+
+
+def failed_runs(row: Row) -> list[str]:
+    """What became of the runs that a row rests on in part only; a row that rests on none of them failed itself."""
+    runs = (row.model_extra or {}).get("runs", ()) if row.failure is None else ()
+    return [f"{row.method}, {run['run']}: {run['failure']}" for run in runs if run.get("failure") is not None]
 
 
 def _success(row: Row) -> str:
@@ -190,6 +199,7 @@ def _scenario_markdown(scenario: ScenarioResult, quoted: Sequence[Row]) -> str:
     if located := _with_localization(rows):
         parts += ["### Localization from an unknown start", "", _markdown_table(LOCALIZATION_COLUMNS, located), ""]
     failures = [f"- {_escaped(row.method)}: FAILED: {_escaped(row.failure)}" for row in rows if row.failure is not None]
+    failures += [f"- {_escaped(line)}" for row in rows for line in failed_runs(row)]
     notes = [f"- {_escaped(line)}" for line in definitions(rows)]
     mark = [f"- {QUOTED_NOTE}"] if any(row.quoted for row in rows) else []
     return "\n".join([*parts, *failures, *notes, *mark, ""])

@@ -18,7 +18,7 @@ from hippodrome.eval.pool import Workers, worker_pool
 from hippodrome.eval.report import write_report
 from hippodrome.eval.results import Results, Row, ScenarioResult, read_results, to_json, write_results
 from hippodrome.eval.run import RESULTS, evaluate, load_scenarios
-from hippodrome.eval.tables import print_table_one, table_one_markdown
+from hippodrome.eval.tables import failed_runs, print_table_one, table_one_markdown
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario
@@ -86,3 +86,5 @@ def _say(row: Row) -> None:
     lost = f", {extra['maps_started']} maps" if (extra := row.model_extra or {}).get("maps_started", 1) > 1 else ""
     print(f"{row.method}: APE {row.ape.mean_m:.2f} m, CPU {row.cpu_percent:.1f} %, map {row.map_bytes / 1e6:.1f} MB, "
           f"{row.keyframes} keyframes of {row.camera_frames} frames{lost}")  # fmt: skip
+    for line in failed_runs(row):
+        print(line)

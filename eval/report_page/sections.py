@@ -24,7 +24,7 @@ from hippodrome.eval.report_page.tables import (
 )
 from hippodrome.eval.results import Row, ScenarioResult
 from hippodrome.eval.scenario_files import PACKAGE
-from hippodrome.eval.tables import definitions, scenario_title
+from hippodrome.eval.tables import definitions, failed_runs, scenario_title
 from hippodrome.eval.thresholds import failed_limits
 from hippodrome.sim.scenario import Thresholds
 
@@ -79,6 +79,7 @@ def _verdict(scenario: ScenarioResult) -> Html | None:
 def _failures(scenario: ScenarioResult) -> Html | None:
     lines = [f"Limit: {line}" for line in _failed_limits(scenario) or []]
     lines += [f"{row.method} failed: {row.failure}" for row in scenario.rows if row.failure is not None]
+    lines += [line for row in scenario.rows for line in failed_runs(row)]
     return element("ul", [element("li", line) for line in lines], class_="failures") if lines else None
 
 

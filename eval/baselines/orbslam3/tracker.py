@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import json
 import multiprocessing
+import signal
 import subprocess
 import threading
 import time
@@ -25,6 +26,8 @@ from hippodrome.proto.atomic import write_atomically
 
 RUNNER = Path(__file__).with_name("runner.py")
 LIMIT_BASE_S, LIMIT_PER_FRAME_S = 300.0, 0.8  # it takes 0.07 s a frame on a free core; ten times that is a hang
+CRASH = "crash.txt"  # why a run of its own doing did not end; such a run is not tried again by the next call
+OWN_FAULTS = {signal.SIGABRT, signal.SIGSEGV, signal.SIGFPE, signal.SIGBUS, signal.SIGILL}  # not SIGKILL: that is want of memory
 NEW_MAP = "New Map created"  # in the log: at the start, and whenever it gave up looking for where it was
 LEAST_TRACKED = 0.5  # of the frames: below, the run counts as lost
 
@@ -79,10 +82,20 @@ class Run:
     steps: Steps | None = None
 
 
+def run_with_replacement(task: RunTask) -> list[Run]:
+    """The run and, if the tracker crashed, another in its place: it divides by zero now and then (UZ-SLAMLab/ORB_SLAM3#608)."""
+    first = run_tracker(task)
+    if not (task.folder / CRASH).exists():
+        return [first]
+    return [first, run_tracker(replace(task, folder=task.folder.with_name(f"{task.folder.name}-again")))]
+
+
 def run_tracker(task: RunTask) -> Run:
-    """The tracker over the drive; a run whose ``result.json`` is in its folder already is read back instead."""
+    """The tracker over the drive; a run whose end is in its folder already is read back instead."""
     folder, drive = task.folder, task.drive
     folder.mkdir(parents=True, exist_ok=True)
+    if (folder / CRASH).exists():
+        return Run(folder, (folder / CRASH).read_text(errors="replace"))
     if not (folder / "result.json").exists():
         write_atomically(folder / "settings.yaml", settings_text(drive.camera, task.loaded is not None).encode())
         if failure := _execute(task):
@@ -141,7 +154,10 @@ def _execute(task: RunTask) -> str | None:
         return f"hung: no end after {limit_s:.0f} s"
     if status == 0 and (task.folder / "result.json").exists():
         return None
-    return f"crashed: {_ending(status)}; last words: {_last_line(log_path)}"
+    failure = f"crashed: {_ending(status)}; last words: {_last_line(log_path)}"
+    if -status in OWN_FAULTS:
+        write_atomically(task.folder / CRASH, failure.encode())
+    return failure
 
 
 def _ended(process: subprocess.Popen[bytes], limit_s: float) -> int | None:

@@ -20,8 +20,9 @@ from hippodrome.eval.baselines.orbslam3.pairs import StereoDrive
 from hippodrome.eval.baselines.orbslam3.poses import body_poses, read_camera_tum, thinned
 from hippodrome.eval.baselines.orbslam3.relocalize import METHOD, map_alignment, score_sequence, sequence_task
 from hippodrome.eval.baselines.orbslam3.rows import FINAL, LIVE, failed_rows, rows
-from hippodrome.eval.baselines.orbslam3.tracker import RunTask, run_tracker
+from hippodrome.eval.baselines.orbslam3.tracker import CRASH, RunTask, run_tracker, run_with_replacement
 from hippodrome.eval.baselines.sequences import SequenceRow
+from hippodrome.eval.tables import failed_runs
 from hippodrome.eval.trajectory_io import read_tum
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.render.camera import CameraSpec
@@ -73,12 +74,12 @@ def frames(monkeypatch):
     monkeypatch.setattr(pairs, "read_pair", read_pair)
 
 
-def run(monkeypatch, folder, ending="", tracked="len(times)", **task):
+def run(monkeypatch, folder, ending="", tracked="len(times)", how=run_tracker, **task):
     script = folder / "stand_in.py"
     folder.mkdir(parents=True, exist_ok=True)
     script.write_text(STAND_IN.format(ending=ending, tracked=tracked))
     monkeypatch.setattr(tracker, "RUNNER", script)
-    return run_tracker(RunTask(Path(sys.executable), folder / "vocabulary.txt", DRIVE, folder / "run", **task))
+    return how(RunTask(Path(sys.executable), folder / "vocabulary.txt", DRIVE, folder / "run", **task))
 
 
 def test_a_good_run_becomes_two_rows(monkeypatch, tmp_path):
@@ -120,6 +121,26 @@ def test_what_goes_wrong_has_a_name(monkeypatch, tmp_path, ending, tracked, caus
     live, final = rows([done], DRIVE)
     assert cause in live.failure
     assert cause in final.failure
+
+
+def test_a_crashed_run_is_replaced_once_and_stays_in_the_row(monkeypatch, tmp_path):
+    crashes = "if not os.getcwd().endswith('again'): os.abort()"
+    first, second = run(monkeypatch, tmp_path, crashes, how=run_with_replacement)
+    assert "crashed: signal 6" in first.failure
+    assert second.failure is None
+    live, _ = rows([first, second], DRIVE)
+    assert (live.median_run, len(live.runs)) == ("run-again", 2)
+    assert [line.partition(";")[0] for line in failed_runs(live)] == ["ORB-SLAM3 (live), run: crashed: signal 6"]
+    again = run(monkeypatch, tmp_path, "raise SystemExit('run again')", how=run_with_replacement)
+    assert [one.failure for one in again] == [first.failure, None]
+    (tmp_path / "run" / CRASH).unlink()  # what a user does who wants it tried again
+    assert [one.failure for one in run(monkeypatch, tmp_path, how=run_with_replacement)] == [None]
+
+
+@pytest.mark.parametrize("ending", ["os.kill(os.getpid(), 9)", "sys.exit(3)"])
+def test_want_of_memory_or_of_a_package_is_no_crash_of_its_own(monkeypatch, tmp_path, ending):
+    assert len(run(monkeypatch, tmp_path, ending, how=run_with_replacement)) == 1
+    assert run(monkeypatch, tmp_path).failure is None
 
 
 def test_a_hang_is_ended(monkeypatch, tmp_path):

@@ -55,4 +55,6 @@ def test_a_method_of_ours_that_failed_has_no_ratio():
 def test_the_spread_of_the_runs_is_in_the_table():
     columns = [column for column in MAPPING_COLUMNS if column.title == "APE of the runs"]
     assert row_cells(columns, theirs(ape_spread_m=[0.312, 0.5])) == ["0.31 to 0.50"]
+    runs = [{"run": "run-0", "failure": "crashed"}, {"run": "run-0-again", "failure": None}]
+    assert row_cells(columns, theirs(ape_spread_m=[0.3, 0.3], runs=runs)) == ["0.30 to 0.30 (1 of 2 failed)"]
     assert row_cells(columns, Row(method="semi-metric")) == ["-"]

@@ -22,10 +22,10 @@ from hippodrome.eval.trajectory_io import read_tum
 
 def draw_comparison(materials: Materials, tracked: Tracked) -> None:
     """Maps, errors and violins of all methods; the tracker's error on the map, and its layers in the report's map."""
-    if tracked.median is None:
+    if tracked.live is None or tracked.final is None:
         return  # what `hippodrome eval` drew is all there is
     truth = materials.mapping.ground_truth()
-    theirs = _tracker_scores(tracked.median, truth)
+    theirs = _tracker_scores(tracked.live, tracked.final, truth)
     draw_methods(materials, {**_our_scores(materials, truth), **theirs})
     add_layers(materials.folder, theirs, truth)
     path, name = materials.folder / f"{file_stem(FINAL)}-ape.png", materials.scenario.name
@@ -53,9 +53,9 @@ def _our_scores(materials: Materials, truth: Trajectory) -> dict[str, Scored]:
     return {method: score_trajectory(one, truth, metric=method in dict(MODES)) for method, one in found.items()}
 
 
-def _tracker_scores(run: Run, truth: Trajectory) -> dict[str, Scored]:
-    """Aligned as in its rows."""
-    found = {LIVE: read_tum(tum_path(run, "live")), FINAL: read_tum(tum_path(run, "final"))}
+def _tracker_scores(live: Run, final: Run, truth: Trajectory) -> dict[str, Scored]:
+    """Of the runs that its rows show, aligned as there."""
+    found = {LIVE: read_tum(tum_path(live, "live")), FINAL: read_tum(tum_path(final, "final"))}
     return {
         method: Scored(one, "se2", ape(one, truth, "se2"), rpe(one, truth), rpe(one, truth, RPE_DELTA_M))
         for method, one in found.items()

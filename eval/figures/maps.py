@@ -29,6 +29,7 @@ from hippodrome.eval.figures.style import (
     save_figure,
 )
 
+DOT_SIZES = 5.5, 2.0  # points, of the first and the last map
 CLIP_PERCENTILE = 99.0  # one lost vertex must not wash out the colours of all others
 
 
@@ -40,8 +41,9 @@ def draw_maps_over_truth(
     axes = figure.subplots()
     draw_network(axes, network)
     axes.plot(truth_m[:, 0], truth_m[:, 1], color=TRUTH, linewidth=0.9, label="ground truth", zorder=4)
-    for (name, positions_m), colour in zip(maps_m.items(), SERIES, strict=False):
-        axes.plot(positions_m[:, 0], positions_m[:, 1], ".", color=colour, markersize=3.5, alpha=0.8, label=name, zorder=3)
+    sizes = np.linspace(*DOT_SIZES, len(maps_m))  # good maps lie on one another: the later ones leave a rim of the earlier
+    for (name, positions_m), colour, size in zip(maps_m.items(), SERIES, sizes, strict=False):
+        axes.plot(positions_m[:, 0], positions_m[:, 1], ".", color=colour, markersize=size, alpha=0.8, label=name, zorder=3)
     axes.autoscale_view()
     axes.set_title(title, loc="left", fontsize=10)
     _legend_below(figure, axes)

@@ -56,6 +56,13 @@ def _row(method: str, which: Which, runs: Sequence[Run], drive: StereoDrive) -> 
     return Row(method=method, **_errors(samples, truth), **_costs(median, drive), **spread)
 
 
+def median_run(row: Row) -> str:
+    """Name of the run that a row shows."""
+    name = (row.model_extra or {})["median_run"]
+    assert isinstance(name, str)
+    return name
+
+
 def tum_path(run: Run, which: Which) -> Path:
     """The scored samples of a run."""
     return run.folder / f"body-{which}.tum"

@@ -10,7 +10,7 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.eval.baselines.orbslam3.environment import NotInstalled, ensure_environment
 from hippodrome.eval.baselines.orbslam3.pairs import StereoDrive, draw_pairs, missing_chunks, stereo_drive
 from hippodrome.eval.baselines.orbslam3.relocalize import empty_rows, map_alignment, score_sequence, sequence_task
-from hippodrome.eval.baselines.orbslam3.rows import failed_rows, rows
+from hippodrome.eval.baselines.orbslam3.rows import failed_rows, median_run, rows
 from hippodrome.eval.baselines.orbslam3.tracker import Run, RunTask, run_tracker, run_with_replacement
 from hippodrome.eval.baselines.orbslam3.training import VocabularyTask, train_vocabulary
 from hippodrome.eval.baselines.sequences import Located, SequenceRow
@@ -37,11 +37,12 @@ class TrackerOptions:
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """Its rows of Table I, and what the second drive's sequences need: the run of median error."""
+    """Its rows of Table I with the runs that they show, and what the second drive's sequences need: the map of ``final``."""
 
     rows: list[Row]
-    median: Run | None = None
-    task: RunTask | None = None  # of that run
+    live: Run | None = None  # of median error while driving
+    final: Run | None = None  # of median error in the end
+    task: RunTask | None = None  # of ``final``
 
 
 def stereo_scenario(scenario: Scenario) -> Scenario:
@@ -68,11 +69,11 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
     with process_pool(_side_by_side(options.runs, pool)) as executor:
         runs = [run for both in replace(pool, executor=executor).run("track", run_with_replacement, tasks) for run in both]
     found = rows(runs, drive)
-    chosen = (found[-1].model_extra or {}).get("median_run")
-    for run in runs:
-        if run.folder.name == chosen:
-            return Tracked(found, run, replace(tasks[0], folder=run.folder))
-    return Tracked(found)
+    if any(row.failure is not None for row in found):
+        return Tracked(found)
+    by_name = {run.folder.name: run for run in runs}
+    live, final = (by_name[median_run(row)] for row in found)
+    return Tracked(found, live, final, replace(tasks[0], folder=final.folder))
 
 
 def _side_by_side(runs: int, pool: Workers) -> int:
@@ -84,11 +85,11 @@ def _side_by_side(runs: int, pool: Workers) -> int:
 def locate(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> list[Located]:
     """Table II's rows: the sequences of the second drive, each in a process that loads the median run's map."""
     wanted = empty_rows()
-    if tracked.task is None or tracked.median is None:
+    if tracked.task is None or tracked.final is None:
         cause = tracked.rows[-1].failure or "no map"
         return [Located(row.model_copy(update={"failure": cause})) for row in wanted]
     drive = stereo_drive(RecordingPlan(stereo_scenario(scenario), "localization", out))
-    alignment = map_alignment(tracked.median, tracked.task.drive.truth())
+    alignment = map_alignment(tracked.final, tracked.task.drive.truth())
     tasks: list[RunTask | str] = [_sequence(row, drive, tracked.task) for row in wanted]
     runs = iter(pool.run("locate", run_tracker, [task for task in tasks if isinstance(task, RunTask)]))
     found = []

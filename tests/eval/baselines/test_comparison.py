@@ -28,8 +28,8 @@ def folder(tmp_path):
     noise = np.random.default_rng(1).normal(0.0, 0.01, TRUTH.poses.shape)
     write_tum(tmp_path / "topometric.tum", Trajectory(TRUTH.t_s[::10], (TRUTH.poses + 5.0 * noise)[::10]))
     turned = TRUTH.poses * np.array([-1.0, -1.0, 1.0]) + np.array([0.0, 0.0, np.pi]) + noise
-    for which in ("live", "final"):
-        write_tum(tmp_path / f"body-{which}.tum", Trajectory(TRUTH.t_s[::7], turned[::7]))
+    for run, which in (("run-0", "live"), ("run-1", "final")):  # each row shows its own median run
+        write_tum(tmp_path / run / f"body-{which}.tum", Trajectory(TRUTH.t_s[::7], turned[::7]))
     path = {"t_s": [0.0, 1.0], "x_m": [0.0, 1.0], "y_m": [0.0, 0.0]}
     evidence = MapEvidence.model_validate({
         "roads": [], "truth": path,
@@ -48,7 +48,7 @@ def materials(folder):
 
 
 def test_the_tracker_is_in_every_figure_and_in_the_map(folder):
-    draw_comparison(materials(folder), Tracked([], Run(folder)))
+    draw_comparison(materials(folder), Tracked([], Run(folder / "run-0"), Run(folder / "run-1")))
     for name in ("errors", "violins", "maps", "ORB-SLAM3-final-ape"):
         assert cv2.imread(str(folder / f"{name}.png")).std() > 1.0
     layers = {layer.name: layer for layer in read_map_evidence(folder / "map.json").methods}

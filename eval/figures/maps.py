@@ -16,7 +16,6 @@ from hippodrome.core.types import CognitiveMap, EdgeKind, FloatArray
 from hippodrome.eval.figures.style import (
     BLUE,
     ERROR_MAP,
-    FLOOR_M,
     ORANGE,
     ROAD,
     SERIES,
@@ -30,7 +29,7 @@ from hippodrome.eval.figures.style import (
 )
 
 DOT_SIZES = 5.5, 2.0  # points, of the first and the last map
-CLIP_PERCENTILE = 99.0  # one lost vertex must not wash out the colours of all others
+ERROR_RANGE_M = 0.05, 5.0  # of the colours, the same in every picture: methods, towns and days can be compared by eye
 
 
 def draw_maps_over_truth(
@@ -76,17 +75,16 @@ def draw_cognitive_map(path: Path, cognitive_map: CognitiveMap, title: str = "")
 def draw_error_map(
     path: Path, network: RoadNetwork, positions_m: FloatArray, errors_m: FloatArray, title: str = "", label: str = "APE (m)"
 ) -> None:
-    """Positions (N, 2 or more columns) coloured by their error (N,) on a logarithmic scale (Fig. 3C)."""
+    """Positions (N, 2 or more columns) coloured by their error (N,) on one logarithmic scale for all (Fig. 3C)."""
     figure = new_figure(7.6, 6.4)
     axes = figure.subplots()
     draw_network(axes, network)
-    low_m, high_m = _colour_range(errors_m)
     order = np.argsort(errors_m, kind="stable")  # the worst on top
     dots = axes.scatter(
         positions_m[order, 0],
         positions_m[order, 1],
-        c=np.maximum(errors_m[order], low_m),
-        norm=LogNorm(low_m, high_m),
+        c=np.maximum(errors_m[order], ERROR_RANGE_M[0]),
+        norm=LogNorm(*ERROR_RANGE_M),
         cmap=ERROR_MAP,
         s=12,
         linewidths=0,
@@ -99,14 +97,6 @@ def draw_error_map(
     bar.outline.set_visible(False)
     axes.set_title(title, loc="left", fontsize=10)
     save_figure(figure, path)
-
-
-def _colour_range(errors_m: FloatArray) -> tuple[float, float]:
-    """From the few smallest to the few largest errors, at least half a decade apart."""
-    if len(errors_m) == 0:
-        return FLOOR_M, 1.0
-    low_m = max(float(np.percentile(errors_m, 100.0 - CLIP_PERCENTILE)), FLOOR_M)
-    return low_m, max(float(np.percentile(errors_m, CLIP_PERCENTILE)), 3.0 * low_m)
 
 
 def _legend_below(figure: Any, axes: Axes) -> None:

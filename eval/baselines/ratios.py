@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from hippodrome.eval.results import Row
 
 OURS: Final = ("topometric (paper)", "topometric")
 RATIOS: Final = "ratios.json"
+NAMES: Final = {"mapping_cpu": "mapping CPU", "map_bytes": "map file", "initial_compute": "compute until the first fix"}
 KNOWN_APE_M: Final = 1.0  # final trajectory, rigid fit; 0.15 to 0.35 on 600 m, 0.55 to 0.65 on 7.2 km of the same kind of town
 LEAST_TRACKED: Final = 0.95
 
@@ -37,6 +38,24 @@ def ratios(rows: Sequence[Row], sequences: Sequence[SequenceRow]) -> dict[str, A
             "initial_compute": _over(first_theirs, first_ours),
         }
     return found
+
+
+def ratio_lines(found: Mapping[str, Any]) -> list[str]:
+    """The same for a terminal."""
+    if "not quoted" in found:
+        return [f"ratios to ORB-SLAM3 not quoted: {found['not quoted']}"]
+    return [f"ORB-SLAM3 over {method}: {_said(figures)}" for method, figures in found.items()]
+
+
+def _said(figures: Mapping[str, Any]) -> str:
+    if "not quoted" in figures:
+        return f"not quoted, {figures['not quoted']}"
+    return ", ".join(f"{name} {times(figures.get(key))}" for key, name in NAMES.items())
+
+
+def times(value: float | None) -> str:
+    """A ratio in words."""
+    return "-" if value is None else f"{value:.0f}x" if value >= 10.0 else f"{value:.1f}x"
 
 
 def _unfit(row: Row) -> str | None:

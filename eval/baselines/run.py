@@ -10,12 +10,12 @@ from rich.console import Console
 from hippodrome.eval.baselines.comparison import draw_comparison, draw_sequences
 from hippodrome.eval.baselines.memory import with_peak_rss
 from hippodrome.eval.baselines.orbslam3.stage import Tracked, TrackerOptions, locate, track
-from hippodrome.eval.baselines.ratios import RATIOS, ratios
+from hippodrome.eval.baselines.ratios import RATIOS, ratio_lines, ratios
 from hippodrome.eval.baselines.sequences import Located, table_two, write_table_two
 from hippodrome.eval.materials import gather
 from hippodrome.eval.paper_rows import quoted_rows
 from hippodrome.eval.pool import Workers, worker_pool
-from hippodrome.eval.report import write_report
+from hippodrome.eval.report import REPORT, write_report
 from hippodrome.eval.results import Results, Row, ScenarioResult, read_results, to_json, write_results
 from hippodrome.eval.run import RESULTS, evaluate, load_scenarios
 from hippodrome.eval.tables import failed_runs, print_table_one, table_one_markdown
@@ -70,7 +70,8 @@ def _complete(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) ->
     draw_sequences(materials, found)
     write_report(out)
     print_table_one(results, quoted_rows(), Console())
-    print(f"ratios: {compared}\ntables: {out / 'table1.md'} {out / 'table2.md'}")
+    print("\n".join(ratio_lines(compared)))
+    print(f"tables:  {out / 'table1.md'} {out / 'table2.md'}\nfigures: {out / scenario.name}/*.png\nreport:  {out / REPORT}")
 
 
 def _joined(results: Results, found: list[Row]) -> Results:

@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hippodrome.eval.baselines.fairness import HEAD, fairness_rows
+from hippodrome.eval.baselines.ratios import NAMES, times
 from hippodrome.eval.baselines.sequences import HEAD as SEQUENCE_HEAD
 from hippodrome.eval.baselines.sequences import QUOTED, SequenceRow, quoted_cells, sequence_cells
 from hippodrome.eval.report_page.markup import Html, element, joined
 from hippodrome.eval.report_page.tables import plain_table
 from hippodrome.eval.results import ScenarioResult
-
-RATIO_NAMES = {"mapping_cpu": "mapping CPU", "map_bytes": "map file", "initial_compute": "compute until the first fix"}
 
 
 def sequences(rows: Sequence[SequenceRow]) -> Html | None:
@@ -33,15 +32,11 @@ def ratios(found: Mapping[str, Any]) -> Html | None:
         return None
     if "not quoted" in found:
         return element("p", f"Not quoted: {found['not quoted']}", class_="note")
-    rows = [[method, *(_times(figures.get(name)) for name in RATIO_NAMES)] for method, figures in found.items()]
-    return plain_table(["ORB-SLAM3 over", *RATIO_NAMES.values()], rows, "ratios")
+    rows = [[method, *(times(figures.get(name)) for name in NAMES)] for method, figures in found.items()]
+    return plain_table(["ORB-SLAM3 over", *NAMES.values()], rows, "ratios")
 
 
 def fairness(scenario: ScenarioResult) -> Html | None:
     """What each method is given."""
     rows = fairness_rows([row.method for row in scenario.rows])
     return plain_table(HEAD, rows, "what each method is given") if rows else None
-
-
-def _times(value: float | None) -> str:
-    return "-" if value is None else f"{value:.0f}x" if value >= 10.0 else f"{value:.1f}x"

@@ -4,7 +4,7 @@ import pytest
 
 from hippodrome.eval.baselines.orbslam3.relocalize import METHOD
 from hippodrome.eval.baselines.orbslam3.rows import FINAL
-from hippodrome.eval.baselines.ratios import OURS, ratios
+from hippodrome.eval.baselines.ratios import OURS, ratio_lines, ratios
 from hippodrome.eval.baselines.sequences import SequenceRow
 from hippodrome.eval.results import ErrorSummary, LocalizationSummary, Row
 from hippodrome.eval.tables import MAPPING_COLUMNS, row_cells
@@ -50,6 +50,13 @@ def test_no_ratio_to_a_tracker_that_did_not_do_its_work(row, cause):
 def test_a_method_of_ours_that_failed_has_no_ratio():
     found = ratios([theirs(), Row(method=OURS[0], failure="no route")], [])
     assert found == {OURS[0]: {"not quoted": "no route"}, OURS[1]: {"not quoted": "no row"}}
+    assert ratio_lines(found)[0] == "ORB-SLAM3 over topometric (paper): not quoted, no route"
+
+
+def test_ratios_in_words():
+    found = {"topometric": {"mapping_cpu": 232.9379, "map_bytes": 4.4, "initial_compute": None}}
+    assert ratio_lines(found) == ["ORB-SLAM3 over topometric: mapping CPU 233x, map file 4.4x, compute until the first fix -"]
+    assert ratio_lines({"not quoted": "crashed"}) == ["ratios to ORB-SLAM3 not quoted: crashed"]
 
 
 def test_the_spread_of_the_runs_is_in_the_table():

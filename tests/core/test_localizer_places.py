@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 from hippodrome.core import localizer_places as places_module
 from hippodrome.core import se2
 from hippodrome.core.road_geometry import road_geometry
-from hippodrome.core.road_network import RoadNetwork
 from tests.core.looped_world import Pictures, topometric_map
+from tests.core.synthetic import lanes_of
 
 PICTURES = Pictures(seed=3)
 MAP = topometric_map(PICTURES, np.random.default_rng(3))
@@ -69,27 +69,9 @@ def test_lane_pull_needs_a_single_lane_of_the_same_way():
         points = [[0.0, y], [100.0, y]]
         return points if heading_east else points[::-1]
 
-    def network(*lanes):
-        count = len(lanes)
-        none = np.full(count, -1, dtype=np.int32)
-        return RoadNetwork(
-            lane_ids=tuple(f"l{i}" for i in range(count)),
-            edge_ids=tuple(f"e{i}" for i in range(count)),
-            lane_edge=np.arange(count, dtype=np.int32),
-            is_internal=np.zeros(count, dtype=bool),
-            width_m=np.full(count, 3.2),
-            speed_limit_mps=np.full(count, 13.9),
-            points_m=np.concatenate([np.array(points) for points in lanes]),
-            point_start=np.arange(0, 2 * count + 1, 2, dtype=np.int32),
-            successor=np.zeros(0, dtype=np.int32),
-            successor_start=np.zeros(count + 1, dtype=np.int32),
-            left_lane=none,
-            right_lane=none,
-        )
-
     pose = np.array([[50.0, 0.6, 0.05]])
-    single = road_geometry(network(lane(0.0, True), lane(3.2, False)))
+    single = road_geometry(lanes_of(lane(0.0, True), lane(3.2, False)))
     assert_allclose(places_module.centred(pose, single, np.array([0.5])), [[50.0, 0.3, 0.05]])
-    double = road_geometry(network(lane(0.0, True), lane(3.2, True)))
+    double = road_geometry(lanes_of(lane(0.0, True), lane(3.2, True)))
     assert_allclose(places_module.centred(pose, double, np.array([0.5])), pose)
     assert_allclose(se2.wrap(pose[:, 2]), pose[:, 2])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import json
 import multiprocessing
+import os
 import signal
 import subprocess
 import threading
@@ -29,6 +30,8 @@ LIMIT_BASE_S, LIMIT_PER_FRAME_S = 300.0, 0.8  # it takes 0.07 s a frame on a fre
 CRASH = "crash.txt"  # why a run of its own doing did not end; such a run is not tried again by the next call
 OWN_FAULTS = {signal.SIGABRT, signal.SIGSEGV, signal.SIGFPE, signal.SIGBUS, signal.SIGILL}  # not SIGKILL: that is want of memory
 NEW_MAP = "New Map created"  # in the log: at the start, and whenever it gave up looking for where it was
+STALL_S, LEAST_WORK = 120.0, 0.02  # of a core for so long: its threads wait for one another, as now and then late in a long drive
+STALLED = f"hung: no work for {STALL_S:.0f} s"
 LEAST_TRACKED = 0.5  # of the frames: below, the run counts as lost
 
 
@@ -83,7 +86,7 @@ class Run:
 
 
 def run_with_replacement(task: RunTask) -> list[Run]:
-    """The run and, if the tracker crashed, another in its place: it divides by zero now and then (UZ-SLAMLab/ORB_SLAM3#608)."""
+    """The run and, if the tracker crashed or locked itself up, another in its place: late in a long drive it often does."""
     first = run_tracker(task)
     if not (task.folder / CRASH).exists():
         return [first]
@@ -145,28 +148,46 @@ def _execute(task: RunTask) -> str | None:
         feeder = threading.Thread(target=_feed, args=(process.stdin, task.drive), daemon=True)
         feeder.start()
         try:
-            status = _ended(process, limit_s)
+            ended = _ended(process, limit_s)
         finally:
             process.kill()
             process.wait()
             feeder.join()
-    if status is None:
-        return f"hung: no end after {limit_s:.0f} s"
-    if status == 0 and (task.folder / "result.json").exists():
+    if ended == 0 and (task.folder / "result.json").exists():
         return None
-    failure = f"crashed: {_ending(status)}; last words: {_last_line(log_path)}"
-    if -status in OWN_FAULTS:
+    if isinstance(ended, str):
+        failure, own_fault = ended, ended == STALLED
+    else:
+        failure, own_fault = f"crashed: {_ending(ended)}; last words: {_last_line(log_path)}", -ended in OWN_FAULTS
+    if own_fault:
         write_atomically(task.folder / CRASH, failure.encode())
     return failure
 
 
-def _ended(process: subprocess.Popen[bytes], limit_s: float) -> int | None:
-    """The exit status; None beyond the limit, or once the command is gone that this process works for: nobody waits any more."""
+def _ended(process: subprocess.Popen[bytes], limit_s: float) -> int | str:
+    """The exit status, or why nobody waits for it any longer."""
     command, end_s = multiprocessing.parent_process(), time.monotonic() + limit_s
-    while time.monotonic() < end_s and (command is None or command.is_alive()):
+    marked_cpu_s, marked_s = 0.0, time.monotonic()
+    while (now_s := time.monotonic()) < end_s:
+        if command is not None and not command.is_alive():
+            return "the command that it worked for is gone"
         with contextlib.suppress(subprocess.TimeoutExpired):
             return process.wait(min(1.0, limit_s))
-    return None
+        if now_s - marked_s > STALL_S:
+            cpu_s = _cpu_s(process.pid)
+            if cpu_s - marked_cpu_s < LEAST_WORK * STALL_S:
+                return STALLED
+            marked_cpu_s, marked_s = cpu_s, now_s
+    return f"hung: no end after {limit_s:.0f} s"
+
+
+def _cpu_s(pid: int) -> float:
+    """User and system time of a process so far; 0 if it is gone."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _write_job(task: RunTask) -> None:

@@ -137,6 +137,13 @@ def test_a_crashed_run_is_replaced_once_and_stays_in_the_row(monkeypatch, tmp_pa
     assert [one.failure for one in run(monkeypatch, tmp_path, how=run_with_replacement)] == [None]
 
 
+def test_a_tracker_that_waits_for_itself_is_ended_soon_and_replaced(monkeypatch, tmp_path):
+    monkeypatch.setattr(tracker, "STALL_S", 1.0)
+    locked = "if not os.getcwd().endswith('again'): time.sleep(60)"
+    first, second = run(monkeypatch, tmp_path, locked, how=run_with_replacement)
+    assert (first.failure, second.failure) == (tracker.STALLED, None)
+
+
 @pytest.mark.parametrize("ending", ["os.kill(os.getpid(), 9)", "sys.exit(3)"])
 def test_want_of_memory_or_of_a_package_is_no_crash_of_its_own(monkeypatch, tmp_path, ending):
     assert len(run(monkeypatch, tmp_path, ending, how=run_with_replacement)) == 1

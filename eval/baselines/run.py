@@ -51,6 +51,9 @@ def run_baselines(options: BaselineOptions) -> None:
         write_atomically(out / ORBSLAM3_RESULTS, to_json([row.model_dump(mode="python") for row in tracked.rows]).encode())
         for row in tracked.rows:
             _say(row)
+        if failed := failed_runs(tracked.rows[-1]):
+            print("\n".join([*failed, f"{options.runs - len(failed)} of {options.runs} runs ended; to add others: --runs "
+                                      f"{options.runs + len(failed)}"]))  # fmt: skip
         if whole:
             _complete(scenario, out, tracked, pool)
 
@@ -87,5 +90,3 @@ def _say(row: Row) -> None:
     lost = f", {extra['maps_started']} maps" if (extra := row.model_extra or {}).get("maps_started", 1) > 1 else ""
     print(f"{row.method}: APE {row.ape.mean_m:.2f} m, CPU {row.cpu_percent:.1f} %, map {row.map_bytes / 1e6:.1f} MB, "
           f"{row.keyframes} keyframes of {row.camera_frames} frames{lost}")  # fmt: skip
-    for line in failed_runs(row):
-        print(line)

@@ -11,7 +11,7 @@ from hippodrome.eval.baselines.orbslam3.environment import NotInstalled, ensure_
 from hippodrome.eval.baselines.orbslam3.pairs import StereoDrive, draw_pairs, missing_chunks, stereo_drive
 from hippodrome.eval.baselines.orbslam3.relocalize import empty_rows, map_alignment, score_sequence, sequence_task
 from hippodrome.eval.baselines.orbslam3.rows import failed_rows, median_run, rows
-from hippodrome.eval.baselines.orbslam3.tracker import Run, RunTask, run_tracker, run_with_replacement
+from hippodrome.eval.baselines.orbslam3.tracker import Run, RunTask, run_tracker
 from hippodrome.eval.baselines.orbslam3.training import VocabularyTask, train_vocabulary
 from hippodrome.eval.baselines.sequences import Located, SequenceRow
 from hippodrome.eval.pool import Workers, process_pool
@@ -67,7 +67,7 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
     tasks = [RunTask(python, vocabulary, drive, folder, options.paced, options.limit_s) for folder in folders]
     print(f"ORB-SLAM3: {options.runs} runs of {drive.frames:,} stereo pairs", flush=True)
     with process_pool(_side_by_side(options.runs, pool)) as executor:
-        runs = [run for both in replace(pool, executor=executor).run("track", run_with_replacement, tasks) for run in both]
+        runs = replace(pool, executor=executor).run("track", run_tracker, tasks)
     found = rows(runs, drive)
     if any(row.failure is not None for row in found):
         return Tracked(found)

@@ -27,7 +27,7 @@ from hippodrome.proto.atomic import write_atomically
 
 RUNNER = Path(__file__).with_name("runner.py")
 LIMIT_BASE_S, LIMIT_PER_FRAME_S = 300.0, 0.8  # it takes 0.07 s a frame on a free core; ten times that is a hang
-CRASH = "crash.txt"  # why a run of its own doing did not end; such a run is not tried again by the next call
+CRASH = "crash.txt"  # why the tracker did not end; the next call does not try the run again: a crash is a result
 OWN_FAULTS = {signal.SIGABRT, signal.SIGSEGV, signal.SIGFPE, signal.SIGBUS, signal.SIGILL}  # not SIGKILL: that is want of memory
 NEW_MAP = "New Map created"  # in the log: at the start, and whenever it gave up looking for where it was
 STALL_S, LEAST_WORK = 120.0, 0.02  # of a core for so long: its threads wait for one another, as now and then late in a long drive
@@ -83,14 +83,6 @@ class Run:
     keyframes: int | None = None
     maps_started: int | None = None  # more than one: it lost its way; maps that never merged lie anywhere to each other
     steps: Steps | None = None
-
-
-def run_with_replacement(task: RunTask) -> list[Run]:
-    """The run and, if the tracker crashed or locked itself up, another in its place: late in a long drive it often does."""
-    first = run_tracker(task)
-    if not (task.folder / CRASH).exists():
-        return [first]
-    return [first, run_tracker(replace(task, folder=task.folder.with_name(f"{task.folder.name}-again")))]
 
 
 def run_tracker(task: RunTask) -> Run:

@@ -20,7 +20,7 @@ from hippodrome.eval.baselines.orbslam3.pairs import StereoDrive
 from hippodrome.eval.baselines.orbslam3.poses import body_poses, read_camera_tum, thinned
 from hippodrome.eval.baselines.orbslam3.relocalize import METHOD, map_alignment, score_sequence, sequence_task
 from hippodrome.eval.baselines.orbslam3.rows import FINAL, LIVE, failed_rows, rows
-from hippodrome.eval.baselines.orbslam3.tracker import CRASH, RunTask, run_tracker, run_with_replacement
+from hippodrome.eval.baselines.orbslam3.tracker import CRASH, RunTask, run_tracker
 from hippodrome.eval.baselines.sequences import SequenceRow
 from hippodrome.eval.tables import failed_runs
 from hippodrome.eval.trajectory_io import read_tum
@@ -74,12 +74,12 @@ def frames(monkeypatch):
     monkeypatch.setattr(pairs, "read_pair", read_pair)
 
 
-def run(monkeypatch, folder, ending="", tracked="len(times)", how=run_tracker, **task):
+def run(monkeypatch, folder, ending="", tracked="len(times)", **task):
     script = folder / "stand_in.py"
     folder.mkdir(parents=True, exist_ok=True)
     script.write_text(STAND_IN.format(ending=ending, tracked=tracked))
     monkeypatch.setattr(tracker, "RUNNER", script)
-    return how(RunTask(Path(sys.executable), folder / "vocabulary.txt", DRIVE, folder / "run", **task))
+    return run_tracker(RunTask(Path(sys.executable), folder / "vocabulary.txt", DRIVE, folder / "run", **task))
 
 
 def test_a_good_run_becomes_two_rows(monkeypatch, tmp_path):
@@ -123,30 +123,25 @@ def test_what_goes_wrong_has_a_name(monkeypatch, tmp_path, ending, tracked, caus
     assert cause in final.failure
 
 
-def test_a_crashed_run_is_replaced_once_and_stays_in_the_row(monkeypatch, tmp_path):
-    crashes = "if not os.getcwd().endswith('again'): os.abort()"
-    first, second = run(monkeypatch, tmp_path, crashes, how=run_with_replacement)
+def test_a_crash_is_kept_as_a_result(monkeypatch, tmp_path):
+    first = run(monkeypatch, tmp_path, ending="os.abort()")
     assert "crashed: signal 6" in first.failure
-    assert second.failure is None
-    live, _ = rows([first, second], DRIVE)
-    assert (live.median_run, len(live.runs)) == ("run-again", 2)
+    assert run(monkeypatch, tmp_path).failure == first.failure
+    live, _ = rows([first, run(monkeypatch, tmp_path / "other")], DRIVE)
+    assert (live.failure, len(live.runs)) == (None, 2)
     assert [line.partition(";")[0] for line in failed_runs(live)] == ["ORB-SLAM3 (live), run: crashed: signal 6"]
-    again = run(monkeypatch, tmp_path, "raise SystemExit('run again')", how=run_with_replacement)
-    assert [one.failure for one in again] == [first.failure, None]
     (tmp_path / "run" / CRASH).unlink()  # what a user does who wants it tried again
-    assert [one.failure for one in run(monkeypatch, tmp_path, how=run_with_replacement)] == [None]
+    assert run(monkeypatch, tmp_path).failure is None
 
 
-def test_a_tracker_that_waits_for_itself_is_ended_soon_and_replaced(monkeypatch, tmp_path):
+def test_a_tracker_that_waits_for_itself_is_ended_soon(monkeypatch, tmp_path):
     monkeypatch.setattr(tracker, "STALL_S", 1.0)
-    locked = "if not os.getcwd().endswith('again'): time.sleep(60)"
-    first, second = run(monkeypatch, tmp_path, locked, how=run_with_replacement)
-    assert (first.failure, second.failure) == (tracker.STALLED, None)
+    assert run(monkeypatch, tmp_path, ending="time.sleep(60)").failure == tracker.STALLED
 
 
 @pytest.mark.parametrize("ending", ["os.kill(os.getpid(), 9)", "sys.exit(3)"])
-def test_want_of_memory_or_of_a_package_is_no_crash_of_its_own(monkeypatch, tmp_path, ending):
-    assert len(run(monkeypatch, tmp_path, ending, how=run_with_replacement)) == 1
+def test_want_of_memory_or_of_a_package_is_tried_again(monkeypatch, tmp_path, ending):
+    assert "crashed" in run(monkeypatch, tmp_path, ending).failure
     assert run(monkeypatch, tmp_path).failure is None
 
 

@@ -52,8 +52,8 @@ def run_baselines(options: BaselineOptions) -> None:
         for row in tracked.rows:
             _say(row)
         if failed := failed_runs(tracked.rows[-1]):
-            print("\n".join([*failed, f"{options.runs - len(failed)} of {options.runs} runs ended; to add others: --runs "
-                                      f"{options.runs + len(failed)}"]))  # fmt: skip
+            ended = f"{options.runs - len(failed)} of {options.runs} runs ended"
+            print("\n".join([*failed, f"{ended}; to add others: --runs {options.runs + len(failed)}"]))
         if whole:
             _complete(scenario, out, tracked, pool)
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
+from types import FrameType
+from typing import NoReturn, TypeVar
 
 import cv2
 from rich.console import Console
@@ -18,6 +20,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from hippodrome.core.types import HippodromeError
 
+INTERRUPTED = 130  # the shell's status for an interrupt
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
 
@@ -102,4 +105,10 @@ def _quiet_worker() -> None:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     one_opencv_thread()
+    signal.signal(signal.SIGINT, _leave)
     sys.stdout = sys.stderr
+
+
+def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
+    """An interrupt from the keyboard reaches every process; one of them says so, the others end without a traceback."""
+    raise SystemExit(INTERRUPTED)

@@ -1,0 +1,35 @@
+"""An interrupt from the keyboard, which reaches every process of a command at once, ends them all without a traceback."""
+
+import os
+import signal
+import subprocess
+import sys
+
+from hippodrome.eval.pool import INTERRUPTED
+
+SCRIPT = f"""
+import sys, time
+from hippodrome.eval.pool import worker_pool
+if __name__ == "__main__":
+    try:
+        with worker_pool(2) as pool:
+            busy = pool.executor.submit(time.sleep, 60.0)
+            pool.executor.submit(time.sleep, 0.0).result()
+            while not busy.running():
+                time.sleep(0.01)
+            print("ready", flush=True)
+            pool.run("wait", time.sleep, [60.0])
+    except KeyboardInterrupt:
+        sys.exit({INTERRUPTED})
+"""
+
+
+def test_an_interrupt_ends_busy_and_idle_workers_quietly(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    command = [sys.executable, str(script)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        os.killpg(process.pid, signal.SIGINT)
+        said = process.communicate(timeout=30)[1]
+    assert (process.returncode, said) == (INTERRUPTED, "")

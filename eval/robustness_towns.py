@@ -59,7 +59,7 @@ def merged(towns: Sequence[Findings]) -> Findings:
 
 def targets_markdown(towns: Mapping[str, Findings], pooled: Sequence[Target]) -> str:
     """One row a target, one column a town."""
-    head = ["item", *towns, "all", "must", "aim", "all", "worst town"]
+    head = ["item", *towns, "all", "must", "aim", "verdict: all", "worst town"]
     lines = ["## Against the targets", "", f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for target, *found in zip(pooled, *(one.targets() for one in towns.values()), strict=True):
         measured = [one for one in found if one.value is not None]
@@ -73,6 +73,10 @@ def targets_markdown(towns: Mapping[str, Findings], pooled: Sequence[Target]) ->
         ]
         lines.append(f"| {' | '.join([*cells, target.verdict, worst])} |")
     return "\n".join([*lines, "", DEFINITION, ""])
+
+
+def _with_unit(target: Target) -> str:
+    return target.figure if target.value is None else f"{target.figure} {target.unit}"
 
 
 def _side_by_side(answers: Sequence[Answers]) -> Answers:

@@ -40,6 +40,10 @@ class Target:
     def figure(self) -> str:
         return "-" if self.value is None else f"{self.value:.3g}"
 
+    @property
+    def with_unit(self) -> str:
+        return self.figure if self.value is None else f"{self.figure} {self.unit}"
+
 
 def targets(
     mapped: dict[str, Any], everywhere: Sequence[dict[str, Any]], places: Sequence[dict[str, Any]], paper: dict[str, Any],
@@ -71,9 +75,8 @@ def markdown(found: Sequence[Target]) -> str:
     """One row a target."""
     lines = ["## Against the targets", "", "| item | measured | must | aim | |", "|---|---|---|---|---|"]
     for target in found:
-        value = target.figure if target.value is None else f"{target.figure} {target.unit}"
         lines.append(
-            f"| {target.item} | {value} | {target.must:g} {target.unit} | {target.aim:g} {target.unit} | {target.verdict} |"
+            f"| {target.item} | {target.with_unit} | {target.must:g} {target.unit} | {target.aim:g} {target.unit} | {target.verdict} |"
         )
     return "\n".join([*lines, ""])
 

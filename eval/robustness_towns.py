@@ -75,10 +75,6 @@ def targets_markdown(towns: Mapping[str, Findings], pooled: Sequence[Target]) ->
     return "\n".join([*lines, "", DEFINITION, ""])
 
 
-def _with_unit(target: Target) -> str:
-    return target.figure if target.value is None else f"{target.figure} {target.unit}"
-
-
 def _side_by_side(answers: Sequence[Answers]) -> Answers:
     """One recogniser's answers in all towns."""
     arrays = {

@@ -75,9 +75,8 @@ def markdown(found: Sequence[Target]) -> str:
     """One row a target."""
     lines = ["## Against the targets", "", "| item | measured | must | aim | |", "|---|---|---|---|---|"]
     for target in found:
-        lines.append(
-            f"| {target.item} | {target.with_unit} | {target.must:g} {target.unit} | {target.aim:g} {target.unit} | {target.verdict} |"
-        )
+        bounds = f"{target.must:g} {target.unit} | {target.aim:g} {target.unit}"
+        lines.append(f"| {target.item} | {target.with_unit} | {bounds} | {target.verdict} |")
     return "\n".join([*lines, ""])
 
 

@@ -22,7 +22,7 @@ from hippodrome.sim.scenario import Scenario
 # The size and about the baseline of the published car data sets. Without grain most of a street's surface has no corner to track;
 # grain finer than a pixel fades by itself, so drawing at twice the size and averaging, half of a pair's time, gains no accuracy.
 STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5, "grain": True, "supersample": 1}
-TRACKER_BYTES = 7_000_000_000  # of memory, late in the paper's drive, when global bundle adjustments overlap: 6 GB, and a reserve
+TRACKER_BYTES = 7_000_000_000  # of memory, late in the paper's drive, when global bundle adjustments overlap: up to 6.6 GB
 
 
 @dataclass(frozen=True, slots=True)

@@ -263,7 +263,8 @@ def _percent(share: float | None) -> str:
 
 def draw_heat_map(path: Path, name: str, results: Sequence[ConditionResult]) -> None:
     """Mean error of each start under each condition; a cross where it was never localized, red where it was false."""
-    errors_m = np.array([[_or_nan(sequence.error_mean_m) for sequence in result.sequences] for result in results])
+    means_m = [[sequence.error_mean_m for sequence in result.sequences] for result in results]
+    errors_m = np.array(means_m, dtype=np.float64)  # None, no error, becomes NaN, no colour
     figure = new_figure(3.2 + 0.55 * errors_m.shape[1], 1.6 + 0.32 * len(results))
     axes = figure.subplots()
     low, high = np.log10(ERROR_RANGE_M)
@@ -296,7 +297,3 @@ def _cell(axes: Axes, column: int, row: int, sequence: SequenceResult) -> None:
 
 def _mean(values: FloatArray) -> float | None:
     return float(values.mean()) if len(values) else None
-
-
-def _or_nan(value: float | None) -> float:
-    return np.nan if value is None else value

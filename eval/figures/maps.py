@@ -28,7 +28,8 @@ from hippodrome.eval.figures.style import (
     save_figure,
 )
 
-DOT_SIZES = 5.5, 2.0  # points, of the first and the last map
+DOT_SIZES = 5.5, 3.0  # points, of the first and the last map
+LEGEND_SIZE = 8.0  # points
 ERROR_RANGE_M = 0.05, 5.0  # of the colours, the same in every picture: methods, towns and days can be compared by eye
 
 
@@ -39,7 +40,7 @@ def draw_maps_over_truth(
     figure = new_figure(7.2, 6.4)
     axes = figure.subplots()
     draw_network(axes, network)
-    axes.plot(truth_m[:, 0], truth_m[:, 1], color=TRUTH, linewidth=0.9, label="ground truth", zorder=4)
+    axes.plot(truth_m[:, 0], truth_m[:, 1], color=TRUTH, linewidth=0.9, label="ground truth", zorder=2.5)
     sizes = np.linspace(*DOT_SIZES, len(maps_m))  # good maps lie on one another: the later ones leave a rim of the earlier
     for (name, positions_m), colour, size in zip(maps_m.items(), SERIES, sizes, strict=False):
         axes.plot(positions_m[:, 0], positions_m[:, 1], ".", color=colour, markersize=size, alpha=0.8, label=name, zorder=3)
@@ -101,4 +102,6 @@ def draw_error_map(
 
 def _legend_below(figure: Any, axes: Axes) -> None:
     """A legend outside the map, where it hides no road."""
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    legend = figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    for handle in legend.get_lines():
+        handle.set_markersize(LEGEND_SIZE)  # however small the dots are in the map, their colour is to be told here

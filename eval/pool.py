@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from typing import NoReturn, TypeVar
 
 import cv2
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from hippodrome.core.types import HippodromeError
 
@@ -39,12 +39,26 @@ class Workers:
         task: Callable[[TaskT], ResultT],
         tasks: Sequence[TaskT],
         weight: Callable[[TaskT], int] = lambda _: 1,
+        follow: Callable[[ResultT], TaskT | None] = lambda _: None,
     ) -> list[ResultT]:
-        """``task`` of each of ``tasks``; the first error stops the stage, and what is already on disk stays there."""
+        """``task`` of each of ``tasks``; the first error stops the stage, and what is already on disk stays there.
+
+        ``follow`` may answer a result with one task more, which is begun as soon as a process is free.
+        """
         bar = self.progress.add_task(stage, total=sum(weight(item) for item in tasks))
         futures = {self.executor.submit(task, item): weight(item) for item in tasks}
+        pending = set(futures)
         try:
-            self._watch(futures, bar)
+            while pending:
+                # In turns, for an interrupt from the keyboard to be heard at once.
+                done, pending = wait(pending, timeout=0.2, return_when="FIRST_COMPLETED")
+                for future in done:
+                    self.progress.advance(bar, futures[future])
+                    if (item := follow(future.result())) is not None:
+                        another = self.executor.submit(task, item)
+                        futures[another] = weight(item)
+                        pending.add(another)
+                self.progress.update(bar, total=sum(futures.values()))
             return [future.result() for future in futures]
         except BrokenProcessPool:
             raise HippodromeError(
@@ -53,15 +67,6 @@ class Workers:
         finally:
             for future in futures:
                 future.cancel()
-
-    def _watch(self, futures: dict[Future[ResultT], int], bar: TaskID) -> None:
-        """Advance the bar as tasks end; polling keeps an interrupt from the keyboard prompt."""
-        pending = set(futures)
-        while pending:
-            done, pending = wait(pending, timeout=0.2, return_when="FIRST_COMPLETED")
-            for future in done:
-                future.result()
-                self.progress.advance(bar, futures[future])
 
 
 @contextmanager

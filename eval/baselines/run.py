@@ -51,9 +51,7 @@ def run_baselines(options: BaselineOptions) -> None:
         write_atomically(out / ORBSLAM3_RESULTS, to_json([row.model_dump(mode="python") for row in tracked.rows]).encode())
         for row in tracked.rows:
             _say(row)
-        if failed := failed_runs(tracked.rows[-1]):
-            ended = f"{options.runs - len(failed)} of {options.runs} runs ended"
-            print("\n".join([*failed, f"{ended}; to add others: --runs {options.runs + len(failed)}"]))
+        _say_failures(tracked.rows[-1])
         if whole:
             _complete(scenario, out, tracked, pool)
 
@@ -81,6 +79,14 @@ def _joined(results: Results, found: list[Row]) -> Results:
     """The evaluation's results with these rows."""
     scenarios = tuple(ScenarioResult(**{**dict(one), "rows": (*one.rows, *found)}) for one in results.scenarios)
     return Results(scenarios=scenarios)
+
+
+def _say_failures(row: Row) -> None:
+    """Which runs did not end, and how to have others; silent if all of them ended, or none was begun."""
+    begun = (row.model_extra or {}).get("runs", ())
+    ended = sum(run.get("failure") is None for run in begun)
+    if ended < len(begun):
+        print("\n".join([*failed_runs(row), f"{ended} of {len(begun)} runs ended; to add others: --runs {len(begun) + 1}"]))
 
 
 def _say(row: Row) -> None:

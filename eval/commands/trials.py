@@ -39,7 +39,13 @@ def add_trial_commands(commands: Any) -> None:
         "baselines", help="score the rivals on the same drive, ORB-SLAM3 among them", description=_baselines.__doc__
     )
     baselines.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="see scenarios/")
-    baselines.add_argument("--runs", type=positive, default=3, metavar="N", help="of ORB-SLAM3, which varies (default: 3)")
+    baselines.add_argument(
+        "--runs",
+        type=positive,
+        default=3,
+        metavar="N",
+        help="of ORB-SLAM3, which varies, and one more if one crashes (default: 3)",
+    )
     baselines.add_argument("--seconds", type=float, metavar="S", help="a quick look: ORB-SLAM3 only, on the first S seconds")
     baselines.add_argument(
         "--time-limit", type=positive, metavar="MIN", help="a run of ORB-SLAM3 that takes longer hangs (default: by its frames)"

@@ -1,11 +1,11 @@
-"""An interrupt from the keyboard, which reaches every process of a command at once, ends them all without a traceback."""
+"""Tasks over processes: results in order, tasks that follow from results, and an end without a traceback when interrupted."""
 
 import os
 import signal
 import subprocess
 import sys
 
-from hippodrome.eval.pool import INTERRUPTED
+from hippodrome.eval.pool import INTERRUPTED, worker_pool
 
 SCRIPT = f"""
 import sys, time
@@ -22,6 +22,11 @@ if __name__ == "__main__":
     except KeyboardInterrupt:
         sys.exit({INTERRUPTED})
 """
+
+
+def test_results_come_in_the_order_of_the_tasks_and_then_of_those_that_follow():
+    with worker_pool(2) as pool:
+        assert pool.run("size", abs, [-8, 3, -5], follow=lambda size: -103 if size == 3 else None) == [8, 3, 5, 103]
 
 
 def test_an_interrupt_ends_busy_and_idle_workers_quietly(tmp_path):

@@ -11,7 +11,7 @@ from hippodrome.eval.baselines.orbslam3.environment import NotInstalled, ensure_
 from hippodrome.eval.baselines.orbslam3.pairs import StereoDrive, draw_pairs, missing_chunks, stereo_drive
 from hippodrome.eval.baselines.orbslam3.relocalize import empty_rows, map_alignment, score_sequence, sequence_task
 from hippodrome.eval.baselines.orbslam3.rows import failed_rows, median_run, rows
-from hippodrome.eval.baselines.orbslam3.tracker import Run, RunTask, run_tracker
+from hippodrome.eval.baselines.orbslam3.tracker import Run, RunTask, own_fault, run_tracker
 from hippodrome.eval.baselines.orbslam3.training import VocabularyTask, train_vocabulary
 from hippodrome.eval.baselines.sequences import Located, SequenceRow
 from hippodrome.eval.pool import Workers, process_pool
@@ -29,7 +29,7 @@ TRACKER_BYTES = 7_000_000_000  # of memory, late in the paper's drive, when glob
 class TrackerOptions:
     """How to run it."""
 
-    runs: int
+    runs: int  # and one more if one of them ends by a fault of its own
     seconds: float | None  # only this much of the drive
     paced: bool
     limit_s: float | None  # of a run
@@ -55,7 +55,11 @@ def stereo_scenario(scenario: Scenario) -> Scenario:
 
 
 def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers) -> Tracked:
-    """Table I's rows: runs of the tracker on the mapping drive, side by side as memory has room."""
+    """Table I's rows: runs of the tracker on the mapping drive, side by side as memory has room.
+
+    One run more when the first of them crashes, begun while others still run: every second one does not survive the
+    paper's drive. No more than one, or the whole would not end within the hour.
+    """
     try:
         python = ensure_environment(out / "venv")
     except NotInstalled as error:
@@ -63,11 +67,13 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
     drive, vocabulary = _prepared(scenario, out, options.seconds, pool)
     key = drive.folder.name.rpartition("-")[2]  # another recording, another run: nothing stale is read back
     how = f"{key}-{drive.frames}-frames{'-paced' if options.paced else ''}"
-    folders = [out / scenario.name / "orb-slam3" / how / f"run-{number}" for number in range(options.runs)]
-    tasks = [RunTask(python, vocabulary, drive, folder, options.paced, options.limit_s) for folder in folders]
+    folders = [out / scenario.name / "orb-slam3" / how / f"run-{number}" for number in range(options.runs + 1)]
+    *tasks, spare = [RunTask(python, vocabulary, drive, folder, options.paced, options.limit_s) for folder in folders]
+    spares = iter([spare])
     print(f"ORB-SLAM3: {options.runs} runs of {drive.frames:,} stereo pairs", flush=True)
     with process_pool(_side_by_side(options.runs, pool)) as executor:
-        runs = replace(pool, executor=executor).run("track", run_tracker, tasks)
+        several = replace(pool, executor=executor)
+        runs = several.run("track", run_tracker, tasks, follow=lambda run: next(spares, None) if own_fault(run) else None)
     found = rows(runs, drive)
     if any(row.failure is not None for row in found):
         return Tracked(found)

@@ -104,6 +104,11 @@ def run_tracker(task: RunTask) -> Run:
     return run
 
 
+def own_fault(run: Run) -> bool:
+    """The tracker crashed or stalled: another run may end."""
+    return (run.folder / CRASH).exists()
+
+
 def read_run(folder: Path, forward_m: float, mapped: bool = True) -> Run:
     """A run from its files; one that localized has no final trajectory."""
     figures = RunFigures(**json.loads((folder / "result.json").read_text()))

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hippodrome.core import se2
 from hippodrome.core.types import HippodromeError, Trajectory
-from hippodrome.eval.baselines.orbslam3 import environment, pairs, tracker
+from hippodrome.eval.baselines.orbslam3 import environment, pairs, stage, tracker
 from hippodrome.eval.baselines.orbslam3.environment import NotInstalled, ensure_environment
 from hippodrome.eval.baselines.orbslam3.pairs import StereoDrive
 from hippodrome.eval.baselines.orbslam3.poses import body_poses, read_camera_tum, thinned
@@ -22,10 +22,12 @@ from hippodrome.eval.baselines.orbslam3.relocalize import METHOD, map_alignment,
 from hippodrome.eval.baselines.orbslam3.rows import FINAL, LIVE, failed_rows, rows
 from hippodrome.eval.baselines.orbslam3.tracker import CRASH, RunTask, run_tracker
 from hippodrome.eval.baselines.sequences import SequenceRow
+from hippodrome.eval.pool import worker_pool
 from hippodrome.eval.tables import failed_runs
 from hippodrome.eval.trajectory_io import read_tum
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.render.camera import CameraSpec
+from hippodrome.sim.scenario import load_scenario
 
 CAMERA = CameraSpec(width=64, height=48, stereo_baseline_m=0.5, forward_m=1.6)
 FRAMES = 40
@@ -192,6 +194,21 @@ def test_some_failures_leave_a_row_of_the_others(monkeypatch, tmp_path):
     assert live.failure is None
     assert live.median_run == good.folder.name
     assert "crashed" in live.runs[0]["failure"]
+
+
+@pytest.mark.parametrize(("signal", "begun"), [("ABRT", 3), ("KILL", 2)])
+def test_one_run_more_if_the_tracker_crashes_by_itself(monkeypatch, tmp_path, signal, begun):
+    python = tmp_path / "python"
+    python.write_text(f"#!/bin/sh\nkill -{signal} $$\n")
+    python.chmod(0o755)
+    monkeypatch.setattr(stage, "ensure_environment", lambda folder: python)
+    monkeypatch.setattr(stage, "_prepared", lambda *_: (StereoDrive(tmp_path, straight(), CAMERA, 0, 0), tmp_path / "words"))
+    scenario = load_scenario(Path("scenarios/paper.yaml"))
+    with worker_pool(2) as pool:
+        tracked = stage.track(scenario, tmp_path, stage.TrackerOptions(2, None, False, None), pool)
+    for row in tracked.rows:
+        assert [run["run"] for run in row.runs] == [f"run-{number}" for number in range(begun)]
+        assert row.failure.count("crashed: signal") == begun
 
 
 @pytest.mark.parametrize(("python", "cause"), [("/bin/false", "exit status 1"), ("/no/such/python", "No such file")])

@@ -5,22 +5,26 @@ import signal
 import subprocess
 import sys
 
+import pytest
+
 from hippodrome.eval.pool import INTERRUPTED, worker_pool
 
-SCRIPT = f"""
-import sys, time
-from hippodrome.eval.pool import worker_pool
+SCRIPT = """
+import signal, sys, time
+from hippodrome.eval.pool import INTERRUPTED, worker_pool
 if __name__ == "__main__":
+    handler, seconds = getattr(signal, sys.argv[1]), float(sys.argv[2])
+    signal.signal(signal.SIGINT, handler)
     try:
         with worker_pool(2) as pool:
-            busy = pool.executor.submit(time.sleep, 60.0)
+            busy = pool.executor.submit(time.sleep, seconds)
             pool.executor.submit(time.sleep, 0.0).result()
             while not busy.running():
                 time.sleep(0.01)
             print("ready", flush=True)
-            pool.run("wait", time.sleep, [60.0])
+            pool.run("wait", time.sleep, [seconds])
     except KeyboardInterrupt:
-        sys.exit({INTERRUPTED})
+        sys.exit(INTERRUPTED)
 """
 
 
@@ -29,12 +33,14 @@ def test_results_come_in_the_order_of_the_tasks_and_then_of_those_that_follow():
         assert pool.run("size", abs, [-8, 3, -5], follow=lambda size: -103 if size == 3 else None) == [8, 3, 5, 103]
 
 
-def test_an_interrupt_ends_busy_and_idle_workers_quietly(tmp_path):
+@pytest.mark.parametrize(("handler", "seconds", "status"), [("default_int_handler", 60.0, INTERRUPTED), ("SIG_IGN", 1.0, 0)])
+def test_an_interrupt_ends_busy_and_idle_workers_quietly_unless_it_is_ignored(tmp_path, handler, seconds, status):
+    """A shell's background commands ignore the keyboard, their workers too."""
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)
-    command = [sys.executable, str(script)]
+    command = [sys.executable, str(script), handler, str(seconds)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         assert process.stdout.readline() == "ready\n"
         os.killpg(process.pid, signal.SIGINT)
         said = process.communicate(timeout=30)[1]
-    assert (process.returncode, said) == (INTERRUPTED, "")
+    assert (process.returncode, said) == (status, "")

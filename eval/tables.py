@@ -69,14 +69,18 @@ def _runs(row: Row) -> str:
     spread = (row.model_extra or {}).get("ape_spread_m")
     if not spread:
         return NONE
-    lost, runs = len(failed_runs(row)), len((row.model_extra or {}).get("runs", ()))
+    lost, runs = len(failed_runs([row])), len((row.model_extra or {}).get("runs", ()))
     return " to ".join(_figure(float(value)) for value in spread) + (f" ({lost} of {runs} failed)" if lost else "")
 
 
-def failed_runs(row: Row) -> list[str]:
-    """What became of the runs that a row rests on in part only; a row that rests on none of them failed itself."""
-    runs = (row.model_extra or {}).get("runs", ()) if row.failure is None else ()
-    return [f"{row.method}, {run['run']}: {run['failure']}" for run in runs if run.get("failure") is not None]
+def failed_runs(rows: Sequence[Row]) -> list[str]:
+    """What became of the runs that rows rest on in part only, a line each; a row that rests on none of them failed itself."""
+    holders: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        for run in (row.model_extra or {}).get("runs", ()) if row.failure is None else ():
+            if run.get("failure") is not None:
+                holders.setdefault((str(run["run"]), str(run["failure"])), []).append(row.method)
+    return [f"{', '.join(methods)}, {run}: {failure}" for (run, failure), methods in holders.items()]
 
 
 def _success(row: Row) -> str:
@@ -199,7 +203,7 @@ def _scenario_markdown(scenario: ScenarioResult, quoted: Sequence[Row]) -> str:
     if located := _with_localization(rows):
         parts += ["### Localization from an unknown start", "", _markdown_table(LOCALIZATION_COLUMNS, located), ""]
     failures = [f"- {_escaped(row.method)}: FAILED: {_escaped(row.failure)}" for row in rows if row.failure is not None]
-    failures += [f"- {_escaped(line)}" for row in rows for line in failed_runs(row)]
+    failures += [f"- {_escaped(line)}" for line in failed_runs(rows)]
     notes = [f"- {_escaped(line)}" for line in definitions(rows)]
     mark = [f"- {QUOTED_NOTE}"] if any(row.quoted for row in rows) else []
     return "\n".join([*parts, *failures, *notes, *mark, ""])

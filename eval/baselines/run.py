@@ -51,7 +51,7 @@ def run_baselines(options: BaselineOptions) -> None:
         write_atomically(out / ORBSLAM3_RESULTS, to_json([row.model_dump(mode="python") for row in tracked.rows]).encode())
         for row in tracked.rows:
             _say(row)
-        _say_failures(tracked.rows[-1])
+        _say_failures(tracked.rows)
         if whole:
             _complete(scenario, out, tracked, pool)
 
@@ -81,12 +81,12 @@ def _joined(results: Results, found: list[Row]) -> Results:
     return Results(scenarios=scenarios)
 
 
-def _say_failures(row: Row) -> None:
+def _say_failures(rows: list[Row]) -> None:
     """Which runs did not end, and how to have others; silent if all of them ended, or none was begun."""
-    begun = (row.model_extra or {}).get("runs", ())
+    begun = (rows[-1].model_extra or {}).get("runs", ())
     ended = sum(run.get("failure") is None for run in begun)
     if ended < len(begun):
-        print("\n".join([*failed_runs(row), f"{ended} of {len(begun)} runs ended; to add others: --runs {len(begun) + 1}"]))
+        print("\n".join([*failed_runs(rows), f"{ended} of {len(begun)} runs ended; to add others: --runs {len(begun) + 1}"]))
 
 
 def _say(row: Row) -> None:

@@ -79,7 +79,7 @@ def _verdict(scenario: ScenarioResult) -> Html | None:
 def _failures(scenario: ScenarioResult) -> Html | None:
     lines = [f"Limit: {line}" for line in _failed_limits(scenario) or []]
     lines += [f"{row.method} failed: {row.failure}" for row in scenario.rows if row.failure is not None]
-    lines += [line for row in scenario.rows for line in failed_runs(row)]
+    lines += failed_runs(scenario.rows)
     return element("ul", [element("li", line) for line in lines], class_="failures") if lines else None
 
 

@@ -129,9 +129,10 @@ def test_a_crash_is_kept_as_a_result(monkeypatch, tmp_path):
     first = run(monkeypatch, tmp_path, ending="os.abort()")
     assert "crashed: signal 6" in first.failure
     assert run(monkeypatch, tmp_path).failure == first.failure
-    live, _ = rows([first, run(monkeypatch, tmp_path / "other")], DRIVE)
+    live, final = rows([first, run(monkeypatch, tmp_path / "other")], DRIVE)
     assert (live.failure, len(live.runs)) == (None, 2)
-    assert [line.partition(";")[0] for line in failed_runs(live)] == ["ORB-SLAM3 (live), run: crashed: signal 6"]
+    said = [line.partition(";")[0] for line in failed_runs([live, final])]
+    assert said == ["ORB-SLAM3 (live), ORB-SLAM3 (final), run: crashed: signal 6"]
     (tmp_path / "run" / CRASH).unlink()  # what a user does who wants it tried again
     assert run(monkeypatch, tmp_path).failure is None
 

@@ -11,6 +11,7 @@ from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from types import FrameType
 from typing import NoReturn, TypeVar
 
@@ -46,7 +47,7 @@ class Workers:
         ``follow`` may answer a result with one task more, which is begun as soon as a process is free.
         """
         bar = self.progress.add_task(stage, total=sum(weight(item) for item in tasks))
-        futures = {self.executor.submit(task, item): weight(item) for item in tasks}
+        futures = {self.executor.submit(perform, task, item): weight(item) for item in tasks}
         pending = set(futures)
         try:
             while pending:
@@ -55,7 +56,7 @@ class Workers:
                 for future in done:
                     self.progress.advance(bar, futures[future])
                     if (item := follow(future.result())) is not None:
-                        another = self.executor.submit(task, item)
+                        another = self.executor.submit(perform, task, item)
                         futures[another] = weight(item)
                         pending.add(another)
                 self.progress.update(bar, total=sum(futures.values()))
@@ -115,6 +116,21 @@ def _quiet_worker() -> None:
     sys.stdout = sys.stderr
 
 
+def perform(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT:
+    """``task`` of ``item`` in a worker. Interrupted, the task clears away what it has begun, and its process ends.
+
+    The executor would take the exit for the task's own failure and begin the next one.
+    """
+    try:
+        return task(item)
+    except SystemExit:
+        os._exit(INTERRUPTED)
+
+
 def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
-    """An interrupt from the keyboard reaches every process; one of them says so, the others end without a traceback."""
+    """An interrupt from the keyboard reaches every process; one of them says so, the others end without a traceback.
+
+    A worker between two tasks may find a message in the queue that another one has left half read: hence no more words.
+    """
+    sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115  # until the process ends
     raise SystemExit(INTERRUPTED)

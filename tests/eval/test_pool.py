@@ -11,18 +11,18 @@ from hippodrome.eval.pool import INTERRUPTED, worker_pool
 
 SCRIPT = """
 import signal, sys, time
-from hippodrome.eval.pool import INTERRUPTED, worker_pool
+from hippodrome.eval.pool import INTERRUPTED, perform, worker_pool
 if __name__ == "__main__":
     handler, seconds = getattr(signal, sys.argv[1]), float(sys.argv[2])
     signal.signal(signal.SIGINT, handler)
     try:
         with worker_pool(2) as pool:
-            busy = pool.executor.submit(time.sleep, seconds)
+            busy = pool.executor.submit(perform, time.sleep, seconds)
             pool.executor.submit(time.sleep, 0.0).result()
             while not busy.running():
                 time.sleep(0.01)
             print("ready", flush=True)
-            pool.run("wait", time.sleep, [seconds])
+            pool.run("wait", time.sleep, 4 * [seconds])
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
 """

@@ -153,10 +153,10 @@ def _execute(task: RunTask) -> str | None:
     if ended == 0 and (task.folder / "result.json").exists():
         return None
     if isinstance(ended, str):
-        failure, own_fault = ended, ended == STALLED
+        failure, own = ended, ended == STALLED
     else:
-        failure, own_fault = f"crashed: {_ending(ended)}; last words: {_last_line(log_path)}", -ended in OWN_FAULTS
-    if own_fault:
+        failure, own = f"crashed: {_ending(ended)}; last words: {_last_line(log_path)}", -ended in OWN_FAULTS
+    if own:
         write_atomically(task.folder / CRASH, failure.encode())
     return failure
 

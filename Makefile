@@ -21,7 +21,7 @@ $(VENV)/.ready: pyproject.toml constraints.txt build_proto.py $(wildcard proto/*
 	@$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
 	@$(BIN)/python -m hippodrome.sim.render.probe --install
 	@echo "compiling the inner loops (half a minute)"
-	@$(BIN)/python -m hippodrome.eval.warm_up
+	@$(BIN)/python -m hippodrome.eval.methods.warm_up
 	@touch $@
 
 setup: $(VENV)/.ready  ## install everything into .venv (the other targets do this themselves)
@@ -54,7 +54,7 @@ docs: setup  ## make the tables of docs/scenarios.md anew from the models
 	@$(BIN)/python -m hippodrome.eval.authoring.reference docs/scenarios.md
 
 cover: eval  ## make the README's picture and table anew from the default run
-	@$(BIN)/python -m hippodrome.eval.report_cover out/eval grid
+	@$(BIN)/python -m hippodrome.eval.report.cover out/eval grid
 
 clean:  ## remove results, keep the environment
 	@rm -rf out

@@ -13,12 +13,18 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.table import Row
-from hippodrome.core import grid_cells, head_direction
-from hippodrome.core.attractor import AttractorConfig
-from hippodrome.core.localizer import Localizer, LocalizerConfig
+from hippodrome.core.attractors import grid_cells, head_direction
+from hippodrome.core.attractors.attractor import AttractorConfig
+from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
 from hippodrome.core.types import AttractorStates, CognitiveMap, Edges, Frame, Observation, ViewCells, Visits
-from hippodrome.core.view_cells import ViewCellConfig, bank_of, describe, start_query_mean, template_mean
-from hippodrome.core.view_search import SearchConfig, index_of, search
+from hippodrome.core.views.descriptors import (
+    ViewCellConfig,
+    bank_of,
+    describe,
+    start_query_mean,
+    template_mean,
+)
+from hippodrome.core.views.index import SearchConfig, index_of, search
 
 BANKS = (1_400, 10_000, 100_000)
 SPACING_M, ROW_M, ROWS_APART_M = 5.0, 2_000.0, 30.0

@@ -13,12 +13,19 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import Row
-from hippodrome.core import experience_map, view_cells, view_step
-from hippodrome.core.cell_graph import graph_of
-from hippodrome.core.experience_map import Closure
-from hippodrome.core.mapper import Mapper, MapperConfig
-from hippodrome.core.sequence_filter import NO_EVIDENCE, filter_step, peak, standardise
+from hippodrome.core.mapping import experience_map
+from hippodrome.core.mapping.experience_map import Closure
+from hippodrome.core.mapping.mapper import Mapper, MapperConfig
 from hippodrome.core.types import CognitiveMap, Frame, Observation
+from hippodrome.core.views import descriptors as view_cells
+from hippodrome.core.views import keyframes as view_step
+from hippodrome.core.views.graph import graph_of
+from hippodrome.core.views.sequence import (
+    NO_EVIDENCE,
+    filter_step,
+    peak,
+    standardise,
+)
 
 RATE_HZ, SPEED_MPS, LAP_M, LAPS = 11.2, 5.5, 3_600.0, 2.0  # the paper's camera and drive
 PIXELS_PER_M = 5

@@ -23,9 +23,9 @@ from benchmarks import rivals
 from benchmarks.table import Row
 from hippodrome.core import se2
 from hippodrome.core.matching.lane_choice import choose_lanes
-from hippodrome.core.matching.route_search import Route, search_route
-from hippodrome.core.matching.search_config import RouteSearchConfig
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.matching.search.config import RouteSearchConfig
+from hippodrome.core.matching.search.route import Route, search_route
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
 from hippodrome.sim.town import TownSpec, build_town
 from tests.core.synthetic import SyntheticDrive, semi_metric_drive

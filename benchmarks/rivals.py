@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
 
 SEARCH_SIGMAS = 5.0  # how far from a point either looks for roads, in sigmas of the trace's noise

@@ -25,7 +25,7 @@ import matplotlib as mpl
 import numpy as np
 
 from benchmarks.table import Row, table
-from hippodrome.core import refine_default
+from hippodrome.core.refinement import route as refine_default
 from hippodrome.core.types import StartPose
 from tests.core.synthetic import SyntheticDrive, grid_network, semi_metric_drive
 

@@ -12,18 +12,42 @@ import numpy as np
 
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import CognitiveMap, HippodromeError, StartPose, Trajectory
-from hippodrome.eval.baselines.rivals import NO_ATTRACTOR, Rival, rivals
-from hippodrome.eval.localization_score import score_localization
-from hippodrome.eval.map_quality import closures, matched_lane_accuracy, matched_lane_ids, score_closures
-from hippodrome.eval.materials import Materials, Scored, Topometric, file_stem, gather, refine_config, score_trajectory
-from hippodrome.eval.metrics import ape
-from hippodrome.eval.report_evidence import write_map_evidence
-from hippodrome.eval.results import Network, Row, ScenarioResult, summarize, summarize_localization
-from hippodrome.eval.scenario_figures import draw_scenario
-from hippodrome.eval.scenario_files import portable
-from hippodrome.eval.stages import dead_reckoning, localize_recording, map_recording, refine_map
-from hippodrome.eval.trajectory_io import write_tum
-from hippodrome.eval.warm_up import warm_up
+from hippodrome.eval.figures.scenario import draw_scenario
+from hippodrome.eval.files.scenarios import portable
+from hippodrome.eval.files.trajectories import write_tum
+from hippodrome.eval.methods.materials import (
+    Materials,
+    Scored,
+    Topometric,
+    file_stem,
+    gather,
+    refine_config,
+    score_trajectory,
+)
+from hippodrome.eval.methods.stages import (
+    dead_reckoning,
+    localize_recording,
+    map_recording,
+    refine_map,
+)
+from hippodrome.eval.methods.warm_up import warm_up
+from hippodrome.eval.metrics.localization import score_localization
+from hippodrome.eval.metrics.map_quality import (
+    closures,
+    matched_lane_accuracy,
+    matched_lane_ids,
+    score_closures,
+)
+from hippodrome.eval.metrics.trajectory import ape
+from hippodrome.eval.report.evidence import write_map_evidence
+from hippodrome.eval.results.model import (
+    Network,
+    Row,
+    ScenarioResult,
+    summarize,
+    summarize_localization,
+)
+from hippodrome.eval.rivals.rows import NO_ATTRACTOR, Rival, rivals
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.proto.codec import save_map
 from hippodrome.sim.recording import Recording

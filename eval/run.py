@@ -11,13 +11,13 @@ from rich.console import Console
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
-from hippodrome.eval.paper_rows import quoted_rows
+from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.pool import Workers, worker_pool
-from hippodrome.eval.report import REPORT, write_report
-from hippodrome.eval.results import Results, ScenarioResult, write_results
-from hippodrome.eval.scenario_files import read_scenario
-from hippodrome.eval.tables import print_table_one, table_one_markdown
-from hippodrome.eval.thresholds import failed_limits
+from hippodrome.eval.report.report import REPORT, write_report
+from hippodrome.eval.results.model import Results, ScenarioResult, write_results
+from hippodrome.eval.results.paper_rows import quoted_rows
+from hippodrome.eval.results.tables import print_table_one, table_one_markdown
+from hippodrome.eval.results.thresholds import failed_limits
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import ROLES, RecordingPlan, finish, prepare, render_chunk
 from hippodrome.sim.recording import CHUNK_FRAMES

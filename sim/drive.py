@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.ego import LENGTH_M, REAR_AXLE_TO_FRONT_M, EgoSpec, Track, follow, wander_m

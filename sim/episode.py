@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import FloatArray, Frame, GroundTruth, IntArray, Observation, Step
 from hippodrome.sim.render.camera import CameraSpec

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 from hippodrome.sim.path import Piece, piece_starts
 

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from scipy.ndimage import gaussian_filter1d
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray
 
 STEP_M: Final = 0.25  # sampling of the path, finer than one simulation step at town speed

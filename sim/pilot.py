@@ -8,7 +8,7 @@ from typing import Final
 import libsumo
 import numpy as np
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import HippodromeError, IntArray
 from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M, EgoSpec, comfortable_speed_mps
 from hippodrome.sim.lane_log import LaneLog, driven_edges, lane_pieces, lanes_ahead, ways_out, ways_to_edge

@@ -7,9 +7,9 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from hippodrome.core.localizer import LocalizerConfig
-from hippodrome.core.mapper import MapperConfig
-from hippodrome.core.refine import RefineConfig
+from hippodrome.core.localization.localizer import LocalizerConfig
+from hippodrome.core.mapping.mapper import MapperConfig
+from hippodrome.core.refinement.refine import RefineConfig
 from hippodrome.sim.ego import EgoSpec
 from hippodrome.sim.episode import camera_divider
 from hippodrome.sim.render.camera import CameraSpec

@@ -12,7 +12,7 @@ from typing import Final
 import libsumo
 import numpy as np
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 from hippodrome.sim.network import HELD_PHASE_S
 from hippodrome.sim.tour import TourGraph

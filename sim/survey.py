@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray
 
 CORRELATION_M = 60.0  # neighbouring roads of one survey are displaced alike, those a few blocks away are not

@@ -11,7 +11,7 @@ from pydantic import Field
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 from hippodrome.sim.network import drivable_edges, edge_lengths_m, edge_links, junction_lengths_m

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hippodrome.core.matching.route_line import BoolArray
-from hippodrome.core.matching.route_search import Route
-from hippodrome.core.matching.track import Track
+from hippodrome.core.matching.search.route import Route
+from hippodrome.core.matching.search.track import Track
 from hippodrome.core.types import Edges, FloatArray
 
 _HALF_CHORD = 3  # steps (15 m) either side over which turning is taken: the length of a turn at a crossing

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from hippodrome.core.matching.lane_graph import build_lane_graph
 from hippodrome.core.matching.route_line import BoolArray, RouteLine
-from hippodrome.core.matching.route_search import Route, best_route
-from hippodrome.core.matching.route_start import prior_starts
-from hippodrome.core.matching.search_config import RouteSearchConfig
-from hippodrome.core.matching.search_field import SearchField
-from hippodrome.core.matching.track import Track
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.matching.search.config import RouteSearchConfig
+from hippodrome.core.matching.search.problem import SearchField
+from hippodrome.core.matching.search.route import Route, best_route
+from hippodrome.core.matching.search.starts import prior_starts
+from hippodrome.core.matching.search.track import Track
+from hippodrome.core.roads.lane_graph import build_lane_graph
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, StartPose
 
 PLACE_SIGMA_M = 2.5  # of the first refinement where lanes are parallel: most of a lane

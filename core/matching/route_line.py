@@ -8,9 +8,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from hippodrome.core.matching.route_search import Route
-from hippodrome.core.road_geometry import interpolate, road_geometry
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.matching.search.route import Route
+from hippodrome.core.roads.geometry import interpolate, road_geometry
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
 
 BoolArray: TypeAlias = NDArray[np.bool_]

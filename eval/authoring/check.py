@@ -11,7 +11,7 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.errors import file_errors
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.evaluate import DEAD_RECKONING, MODES, SEMI_METRIC
-from hippodrome.eval.scenario_files import read_scenario
+from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.sim.record import ROLES
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import TourGraph, tour_graph, toured_area

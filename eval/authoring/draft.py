@@ -14,7 +14,7 @@ import yaml
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.network_notes import network_notes
-from hippodrome.eval.scenario_files import PACKAGE, located
+from hippodrome.eval.files.scenarios import PACKAGE, located
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
 from hippodrome.sim.scenario import Scenario

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.types import Town
 

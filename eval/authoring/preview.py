@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, Frame, IntArray
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.figures.frames import draw_contact_sheet

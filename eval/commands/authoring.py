@@ -70,7 +70,7 @@ def _validate(options: argparse.Namespace) -> int:
 def _preview(options: argparse.Namespace) -> int:
     """Simulate both drives of each scenario, draw them from above and a few frames; prints statistics."""
     from hippodrome.eval.authoring.preview import preview_scenario
-    from hippodrome.eval.scenario_files import read_scenario
+    from hippodrome.eval.files.scenarios import read_scenario
 
     for path in options.files:
         scenario = read_scenario(path)

@@ -45,7 +45,7 @@ def _render(options: argparse.Namespace) -> int:
 
 def _report(options: argparse.Namespace) -> int:
     """Make DIR/report.html from DIR/results.json and the files beside it."""
-    from hippodrome.eval.report import write_report
+    from hippodrome.eval.report.report import write_report
 
     print(write_report(options.results))
     return DONE

@@ -47,7 +47,7 @@ def _settings(parser: argparse.ArgumentParser, part: str) -> None:
 
 def _map(options: argparse.Namespace) -> int:
     """Build the semi-metric cognitive map of a recording from its frames and self-motion."""
-    from hippodrome.eval.stages import map_files
+    from hippodrome.eval.methods.stages import map_files
 
     map_files(options.recording, options.scenario, options.out)
     return DONE
@@ -55,7 +55,7 @@ def _map(options: argparse.Namespace) -> int:
 
 def _refine(options: argparse.Namespace) -> int:
     """Constrain a semi-metric map with a road network (RC-HMM)."""
-    from hippodrome.eval.stages import refine_files
+    from hippodrome.eval.methods.stages import refine_files
 
     refine_files(options.map, options.network, options.mode, options.start, options.scenario, options.out)
     return DONE
@@ -63,7 +63,7 @@ def _refine(options: argparse.Namespace) -> int:
 
 def _localize(options: argparse.Namespace) -> int:
     """Localize a recorded drive in a topometric map from an unknown start; writes a TUM trajectory of the localized stretches."""
-    from hippodrome.eval.stages import localize_files
+    from hippodrome.eval.methods.stages import localize_files
 
     localize_files(options.map, options.recording, options.network, options.scenario, options.out)
     return DONE

@@ -58,7 +58,7 @@ def add_trial_commands(commands: Any) -> None:
 
 def _stress(options: argparse.Namespace) -> int:
     """Refine maps from real frames under noise, false closures, survey error and missing roads; a table with the worst cases."""
-    from hippodrome.eval.stress import stress
+    from hippodrome.eval.trials.stress.run import stress
 
     stress(options.scenarios, options.seeds, options.cases, options.workers, options.out)
     return DONE
@@ -66,7 +66,7 @@ def _stress(options: argparse.Namespace) -> int:
 
 def _robustness(options: argparse.Namespace) -> int:
     """Map each town once, then localize from several unknown starts under each of many conditions; tables and a heat map."""
-    from hippodrome.eval.robustness import Request, robustness
+    from hippodrome.eval.trials.robustness.run import Request, robustness
 
     modes = list(dict.fromkeys(["default", *options.modes]))
     robustness(
@@ -77,7 +77,7 @@ def _robustness(options: argparse.Namespace) -> int:
 
 def _baselines(options: argparse.Namespace) -> int:
     """Evaluate a scenario, run binocular ORB-SLAM3 on both its drives and write Tables I and II with all rows; resumable."""
-    from hippodrome.eval.baselines.run import BaselineOptions, run_baselines
+    from hippodrome.eval.trials.rivals.run import BaselineOptions, run_baselines
 
     limit_s = None if options.time_limit is None else 60.0 * options.time_limit
     wanted = options.scenario, options.out, options.runs, options.workers, options.seconds, options.paced, limit_s

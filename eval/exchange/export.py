@@ -12,7 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from hippodrome.eval.exchange.source import ExchangeError, ExportedDrive, gather_drives
+from hippodrome.eval.exchange.drives.exported import ExchangeError, ExportedDrive, gather_drives
 
 # Format -> module below ``formats``. Those with packages of the extra are imported only when they are asked for.
 FORMATS: Final = {

@@ -12,11 +12,19 @@ import cv2
 import numpy as np
 
 from hippodrome.core.types import FloatArray, Frame, Trajectory
+from hippodrome.eval.exchange.drives.exported import ExchangeError
+from hippodrome.eval.exchange.drives.foreign import (
+    ForeignDrive,
+    ForeignFrame,
+    Motion,
+    decode,
+    motion_of,
+    require_increasing,
+    truth_at,
+)
+from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.export import format_module, new_folder
-from hippodrome.eval.exchange.foreign import ForeignDrive, ForeignFrame, Motion, decode, motion_of, require_increasing, truth_at
-from hippodrome.eval.exchange.poses import Axes
 from hippodrome.eval.exchange.readers.tables import read_motion, read_tum_poses
-from hippodrome.eval.exchange.source import ExchangeError
 from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.files import sha256_of

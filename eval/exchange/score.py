@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from hippodrome.core.types import HippodromeError, Trajectory
-from hippodrome.eval.align import AlignmentName
-from hippodrome.eval.exchange.source import ExchangeError, truth_of
-from hippodrome.eval.materials import RPE_DELTA_M
-from hippodrome.eval.metrics import Score, ape, rpe
-from hippodrome.eval.trajectory_io import read_tum
+from hippodrome.eval.exchange.drives.exported import ExchangeError, truth_of
+from hippodrome.eval.files.trajectories import read_tum
+from hippodrome.eval.methods.materials import RPE_DELTA_M
+from hippodrome.eval.metrics.alignment import AlignmentName
+from hippodrome.eval.metrics.trajectory import Score, ape, rpe
 from hippodrome.proto.codec import load_map
 from hippodrome.sim.recording import open_recording
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.figures.style import FLOOR_M, SERIES, Axes, log_errors, new_figure, save_figure, tidy
-from hippodrome.eval.metrics import Score
+from hippodrome.eval.metrics.trajectory import Score
 
 VIOLIN_GRID = 200
 

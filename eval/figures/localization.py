@@ -24,7 +24,7 @@ from hippodrome.eval.figures.style import (
     save_figure,
     tidy,
 )
-from hippodrome.eval.localization_score import FALSE_FIX_M, LocalizationScore
+from hippodrome.eval.metrics.localization import FALSE_FIX_M, LocalizationScore
 
 SHEET_SIZE = 48
 RING_SIZE = 72

@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import LogLocator
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, EdgeKind, FloatArray
 from hippodrome.eval.figures.style import (
     BLUE,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
 from hippodrome.eval.figures.style import BLUE, GREEN, ORANGE, VERMILION, draw_network, new_figure, save_figure
 

@@ -10,7 +10,13 @@ from typing import Any, Final
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.results import ErrorSummary, Results, Row, ScenarioResult, to_json
+from hippodrome.eval.results.model import (
+    ErrorSummary,
+    Results,
+    Row,
+    ScenarioResult,
+    to_json,
+)
 from hippodrome.proto.atomic import write_atomically
 
 FORMAT: Final = 1

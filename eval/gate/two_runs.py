@@ -11,7 +11,7 @@ from rich.table import Table
 from hippodrome.eval.gate.baseline import baseline_of
 from hippodrome.eval.gate.compare import lost_cells, require_comparable
 from hippodrome.eval.gate.report import MOVED
-from hippodrome.eval.results import Results, read_results
+from hippodrome.eval.results.model import Results, read_results
 
 
 @dataclass(frozen=True, slots=True)

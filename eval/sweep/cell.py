@@ -14,15 +14,15 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from hippodrome.core.types import Trajectory
-from hippodrome.eval.association import associate
 from hippodrome.eval.evaluate import MODES, EvaluationTask, evaluate_scenario
-from hippodrome.eval.localization_score import FALSE_FIX_M
-from hippodrome.eval.materials import file_stem, score_trajectory
-from hippodrome.eval.metrics import Score
-from hippodrome.eval.results import Row, ScenarioResult
+from hippodrome.eval.files.trajectories import read_tum
+from hippodrome.eval.methods.materials import file_stem, score_trajectory
+from hippodrome.eval.metrics.association import associate
+from hippodrome.eval.metrics.localization import FALSE_FIX_M
+from hippodrome.eval.metrics.trajectory import Score
+from hippodrome.eval.results.model import Row, ScenarioResult
 from hippodrome.eval.sweep.executors import SweepError
 from hippodrome.eval.sweep.grid import Cell, code_sha256
-from hippodrome.eval.trajectory_io import read_tum
 from hippodrome.sim.record import RecordingPlan, Role, close_renderer, record
 
 ROLES: Final[tuple[Role, ...]] = ("mapping", "localization")

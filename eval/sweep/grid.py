@@ -15,12 +15,20 @@ import yaml
 from pydantic import ValidationError
 
 import hippodrome.core.types
-from hippodrome.eval.scenario_files import read_scenario
+from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.sweep.executors import SweepError
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS
 
-CODE = ("core/**/*.py", "sim/**/*.py", "proto/**/*.py", "eval/*.py", "eval/baselines/**/*.py")  # what figures come from
+CODE = (
+    "core/**/*.py",
+    "sim/**/*.py",
+    "proto/**/*.py",
+    "eval/*.py",
+    "eval/methods/**/*.py",
+    "eval/metrics/**/*.py",
+    "eval/rivals/**/*.py",
+)
 MAX_CELLS = 100_000  # a slip of the keyboard, not a sweep
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from hippodrome.eval.pool import progress_bar
-from hippodrome.eval.results import Results, to_json, write_results
+from hippodrome.eval.results.model import Results, to_json, write_results
 from hippodrome.eval.sweep.cell import ROLES, CellResult, CellTask, RecordingTask, make_recording, run_cell
 from hippodrome.eval.sweep.executors import Failure, Runner, SweepError, dask_cluster, local_processes
 from hippodrome.eval.sweep.grid import Cell, Parameter, code_sha256, make_grid

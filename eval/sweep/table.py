@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hippodrome.eval.metrics import pool
-from hippodrome.eval.results import Row, summarize
+from hippodrome.eval.metrics.trajectory import pool
+from hippodrome.eval.results.model import Row, summarize
 from hippodrome.eval.sweep.cell import CellResult
 from hippodrome.eval.sweep.grid import Cell
 

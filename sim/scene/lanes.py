@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.spatial import KDTree
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray, UInt8Array
 
 PIECE_M: Final = 3.0  # the length of a painted dash

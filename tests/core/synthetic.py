@@ -7,10 +7,10 @@ from scipy.sparse import csr_array, diags_array
 from scipy.spatial import cKDTree
 
 from hippodrome.core import se2
-from hippodrome.core.gauss_newton import gauss_newton
-from hippodrome.core.road_geometry import interpolate, road_geometry
-from hippodrome.core.road_network import RoadNetwork
-from hippodrome.core.topometric_cost import local_residual
+from hippodrome.core.roads.geometry import interpolate, road_geometry
+from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.solvers.gauss_newton import gauss_newton
+from hippodrome.core.solvers.pose_costs import local_residual
 from hippodrome.core.types import AttractorStates, CognitiveMap, EdgeKind, Edges, ViewCells, Visits
 
 LANE_OFFSET_M = 1.6

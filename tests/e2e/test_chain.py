@@ -5,14 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from hippodrome.core.mapper import MapperConfig
+from hippodrome.core.mapping.mapper import MapperConfig
 from hippodrome.core.types import EdgeKind
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED
-from hippodrome.eval.metrics import ape
-from hippodrome.eval.results import read_results, to_json, without_timings
-from hippodrome.eval.stages import map_recording
-from hippodrome.eval.trajectory_io import read_tum
+from hippodrome.eval.files.trajectories import read_tum
+from hippodrome.eval.methods.stages import map_recording
+from hippodrome.eval.metrics.trajectory import ape
+from hippodrome.eval.results.model import read_results, to_json, without_timings
 
 
 def rows_of(out):

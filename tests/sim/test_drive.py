@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import sumo
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import HippodromeError
 from hippodrome.sim.drive import project_m, simulate_drive

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.sim.ego import LIMIT_LATERAL_MPS2, MAX_STEERING_RAD, EgoCar, EgoSpec, comfortable_speed_mps, follow, wander_m
 from hippodrome.sim.path import MAX_CURVATURE_1PM, STEP_M, Path, Piece, sample_count, smooth_path

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.sim.scene.build import build_scene
 from hippodrome.sim.scene.conditions import Conditions
 from hippodrome.sim.scene.lanes import PIECE_M, Beside, beside, cut_lanes

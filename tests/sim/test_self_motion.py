@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hippodrome.core.road_network import RoadNetwork
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.self_motion import NOISE_LEVELS, SelfMotionNoise, sense_self_motion
 from hippodrome.sim.survey import with_survey_error

@@ -10,10 +10,16 @@ import numpy as np
 import yaml
 
 from hippodrome.core.types import Trajectory
-from hippodrome.eval.exchange.camera import camera_in_body, camera_of, intrinsics, pictures, right_in_left
-from hippodrome.eval.exchange.poses import nanoseconds, quaternions
-from hippodrome.eval.exchange.source import ExportedDrive
-from hippodrome.eval.exchange.tables import flat, write_rows
+from hippodrome.eval.exchange.drives.camera import (
+    camera_in_body,
+    camera_of,
+    intrinsics,
+    pictures,
+    right_in_left,
+)
+from hippodrome.eval.exchange.drives.exported import ExportedDrive
+from hippodrome.eval.exchange.drives.poses import nanoseconds, quaternions
+from hippodrome.eval.exchange.drives.tables import flat, write_rows
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.render.camera import CameraSpec
 

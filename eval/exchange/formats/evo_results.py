@@ -12,10 +12,10 @@ from evo.core.trajectory import PoseTrajectory3D
 from evo.tools import file_interface
 
 from hippodrome.core.types import FloatArray
-from hippodrome.eval.association import associate
-from hippodrome.eval.exchange.poses import quaternions
-from hippodrome.eval.exchange.source import Estimate, ExchangeError, ExportedDrive
-from hippodrome.eval.materials import RPE_DELTA_M
+from hippodrome.eval.exchange.drives.exported import Estimate, ExchangeError, ExportedDrive
+from hippodrome.eval.exchange.drives.poses import quaternions
+from hippodrome.eval.methods.materials import RPE_DELTA_M
+from hippodrome.eval.metrics.association import associate
 
 CONVENTIONS = (
     "made by evo itself, of the reference interpolated to the estimate's times; position errors in metres",

@@ -9,10 +9,21 @@ import cv2
 import numpy as np
 
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
-from hippodrome.eval.exchange.camera import camera_in_body, camera_of, intrinsics, pictures, right_in_left
-from hippodrome.eval.exchange.poses import matrices
-from hippodrome.eval.exchange.source import ExportedDrive
-from hippodrome.eval.exchange.tables import ODOMETRY, flat, write_odometry, write_rows
+from hippodrome.eval.exchange.drives.camera import (
+    camera_in_body,
+    camera_of,
+    intrinsics,
+    pictures,
+    right_in_left,
+)
+from hippodrome.eval.exchange.drives.exported import ExportedDrive
+from hippodrome.eval.exchange.drives.poses import matrices
+from hippodrome.eval.exchange.drives.tables import (
+    ODOMETRY,
+    flat,
+    write_odometry,
+    write_rows,
+)
 from hippodrome.sim.recording import PNG_LEVEL
 from hippodrome.sim.render.camera import CameraSpec
 

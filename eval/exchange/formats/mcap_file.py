@@ -26,9 +26,15 @@ from mcap_protobuf.writer import Writer
 from scipy.spatial.transform import Rotation
 
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.exchange.camera import camera_in_body, camera_of, intrinsics, pictures
-from hippodrome.eval.exchange.poses import nanoseconds, quaternions
-from hippodrome.eval.exchange.scene import (
+from hippodrome.eval.exchange.drives.camera import (
+    camera_in_body,
+    camera_of,
+    intrinsics,
+    pictures,
+)
+from hippodrome.eval.exchange.drives.exported import ExportedDrive
+from hippodrome.eval.exchange.drives.poses import nanoseconds, quaternions
+from hippodrome.eval.exchange.drives.scene import (
     CAMERA_FRAME,
     NETWORK_FRAME,
     VEHICLE_FRAME,
@@ -38,8 +44,7 @@ from hippodrome.eval.exchange.scene import (
     map_frame_id,
     own_frames,
 )
-from hippodrome.eval.exchange.source import ExportedDrive
-from hippodrome.eval.stages import dead_reckoning
+from hippodrome.eval.methods.stages import dead_reckoning
 
 CONVENTIONS = (
     "messages: Foxglove's protobuf schemas; log time: whole nanoseconds from the start of the drive; poses: doubles, exact",

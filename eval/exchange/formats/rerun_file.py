@@ -9,9 +9,15 @@ import numpy as np
 import rerun as rr
 
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.exchange.camera import camera_in_body, camera_of, intrinsics, pictures
-from hippodrome.eval.exchange.poses import quaternions
-from hippodrome.eval.exchange.scene import (
+from hippodrome.eval.exchange.drives.camera import (
+    camera_in_body,
+    camera_of,
+    intrinsics,
+    pictures,
+)
+from hippodrome.eval.exchange.drives.exported import ExportedDrive
+from hippodrome.eval.exchange.drives.poses import quaternions
+from hippodrome.eval.exchange.drives.scene import (
     CAMERA_FRAME,
     NETWORK_FRAME,
     VEHICLE_FRAME,
@@ -21,7 +27,6 @@ from hippodrome.eval.exchange.scene import (
     map_frame_id,
     own_frames,
 )
-from hippodrome.eval.exchange.source import ExportedDrive
 
 CONVENTIONS = (
     "timeline drive: seconds from the start; /network: metres, road network's frame; positions are 32-bit floats in this format",

@@ -12,11 +12,16 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.exchange.camera import pictures
-from hippodrome.eval.exchange.poses import nanoseconds, quaternions
-from hippodrome.eval.exchange.scene import CAMERA_FRAME, NETWORK_FRAME, VEHICLE_FRAME, frame_id
-from hippodrome.eval.exchange.source import ExportedDrive
-from hippodrome.eval.stages import dead_reckoning
+from hippodrome.eval.exchange.drives.camera import pictures
+from hippodrome.eval.exchange.drives.exported import ExportedDrive
+from hippodrome.eval.exchange.drives.poses import nanoseconds, quaternions
+from hippodrome.eval.exchange.drives.scene import (
+    CAMERA_FRAME,
+    NETWORK_FRAME,
+    VEHICLE_FRAME,
+    frame_id,
+)
+from hippodrome.eval.methods.stages import dead_reckoning
 
 CONVENTIONS = (
     "a bag (MCAP storage) a drive; messages of ROS 2 Humble; time: whole nanoseconds from the start of the drive; doubles, exact",

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from hippodrome.eval.exchange.camera import pictures
-from hippodrome.eval.exchange.source import ExportedDrive
-from hippodrome.eval.exchange.tables import ODOMETRY, write_odometry, write_rows
-from hippodrome.eval.trajectory_io import write_tum
+from hippodrome.eval.exchange.drives.camera import pictures
+from hippodrome.eval.exchange.drives.exported import ExportedDrive
+from hippodrome.eval.exchange.drives.tables import ODOMETRY, write_odometry, write_rows
+from hippodrome.eval.files.trajectories import write_tum
 
 CONVENTIONS = (
     "poses are the rear axle's (x forward, y left, z up); t x y z qx qy qz qw, printed to read back exactly",

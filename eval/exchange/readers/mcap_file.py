@@ -14,11 +14,17 @@ from mcap.reader import McapReader, make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.exchange.foreign import ForeignDrive, ForeignFrame, Motion, motion_table, trajectory_of
-from hippodrome.eval.exchange.poses import Axes
+from hippodrome.eval.exchange.drives.exported import ExchangeError
+from hippodrome.eval.exchange.drives.foreign import (
+    ForeignDrive,
+    ForeignFrame,
+    Motion,
+    motion_table,
+    trajectory_of,
+)
+from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.readers.raw_image import png_of
 from hippodrome.eval.exchange.readers.spool import Spool
-from hippodrome.eval.exchange.source import ExchangeError
 
 IMAGES = ("foxglove.CompressedImage", "foxglove.RawImage")
 ODOMETRY, POSE = "foxglove.Odometry", "foxglove.PoseInFrame"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from hippodrome.eval.exchange.source import ExchangeError
+from hippodrome.eval.exchange.drives.exported import ExchangeError
 
 CHANNELS = {"rgb8": 3, "bgr8": 3, "mono8": 1}
 

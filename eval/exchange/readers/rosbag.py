@@ -12,11 +12,17 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from hippodrome.core.types import Trajectory
-from hippodrome.eval.exchange.foreign import ForeignDrive, ForeignFrame, Motion, motion_table, trajectory_of
-from hippodrome.eval.exchange.poses import Axes
+from hippodrome.eval.exchange.drives.exported import ExchangeError
+from hippodrome.eval.exchange.drives.foreign import (
+    ForeignDrive,
+    ForeignFrame,
+    Motion,
+    motion_table,
+    trajectory_of,
+)
+from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.readers.raw_image import png_of
 from hippodrome.eval.exchange.readers.spool import Spool
-from hippodrome.eval.exchange.source import ExchangeError
 
 COMPRESSED, RAW = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"
 ODOMETRY, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"

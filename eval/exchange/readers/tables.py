@@ -9,7 +9,8 @@ import numpy as np
 import yaml
 
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.exchange.foreign import (
+from hippodrome.eval.exchange.drives.exported import ExchangeError
+from hippodrome.eval.exchange.drives.foreign import (
     ForeignDrive,
     ForeignFrame,
     Motion,
@@ -21,9 +22,8 @@ from hippodrome.eval.exchange.foreign import (
     read_table,
     trajectory_of,
 )
-from hippodrome.eval.exchange.poses import Axes, planar
-from hippodrome.eval.exchange.source import ExchangeError
-from hippodrome.eval.exchange.tables import ODOMETRY
+from hippodrome.eval.exchange.drives.poses import Axes, planar
+from hippodrome.eval.exchange.drives.tables import ODOMETRY
 
 EUROC_ODOMETRY = Path("odometry0", "data.csv")
 EUROC_TRUTH = Path("state_groundtruth_estimate0", "data.csv")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hippodrome.core.matching.evidence import Stretch, credible, not_denied, stretches, turning
-from hippodrome.core.matching.track import Track
+from hippodrome.core.matching.search.track import Track
 
 
 def track(heading_rad):

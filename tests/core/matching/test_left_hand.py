@@ -1,7 +1,7 @@
 import numpy as np
 
-from hippodrome.core.matching.route_search import search_route
-from hippodrome.core.matching.search_config import RouteSearchConfig
+from hippodrome.core.matching.search.config import RouteSearchConfig
+from hippodrome.core.matching.search.route import search_route
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.town import read_town
 from tests.core.matching.drives import misplaced_m, random_drive

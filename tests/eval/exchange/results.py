@@ -7,7 +7,7 @@ import numpy as np
 
 from hippodrome.core import se2
 from hippodrome.core.types import Trajectory
-from hippodrome.eval.trajectory_io import write_tum
+from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.proto.codec import save_map
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.files import sha256_of

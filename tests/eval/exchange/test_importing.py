@@ -14,12 +14,18 @@ from hippodrome.core import se2
 from hippodrome.core.types import Trajectory
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
-from hippodrome.eval.exchange.foreign import ForeignFrame, Motion, decode, motion_of, truth_at
+from hippodrome.eval.exchange.drives.exported import ExchangeError, truth_of
+from hippodrome.eval.exchange.drives.foreign import (
+    ForeignFrame,
+    Motion,
+    decode,
+    motion_of,
+    truth_at,
+)
 from hippodrome.eval.exchange.importing import _samples
 from hippodrome.eval.exchange.readers.raw_image import png_of
 from hippodrome.eval.exchange.readers.spool import Spool
-from hippodrome.eval.exchange.source import ExchangeError, truth_of
-from hippodrome.eval.trajectory_io import read_tum, write_tum
+from hippodrome.eval.files.trajectories import read_tum, write_tum
 from hippodrome.sim.recording import open_recording
 
 SOURCES = {

@@ -10,8 +10,8 @@ from evo.tools import file_interface
 from hippodrome.core import se2
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT
-from hippodrome.eval.metrics import ape, rpe
-from hippodrome.eval.trajectory_io import read_tum
+from hippodrome.eval.files.trajectories import read_tum
+from hippodrome.eval.metrics.trajectory import ape, rpe
 from hippodrome.sim.recording import frame_name
 from hippodrome.sim.render.camera import camera_position_m, camera_to_world
 from tests.eval.exchange.results import CAMERA

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.results import Network, ScenarioResult
+from hippodrome.eval.results.model import Network, ScenarioResult
 from hippodrome.eval.sweep import run
 from hippodrome.eval.sweep.cell import CellResult
 from hippodrome.eval.sweep.grid import parse_parameter

@@ -10,7 +10,7 @@ import pytest
 
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
-from hippodrome.eval.results import read_results, to_json, without_timings
+from hippodrome.eval.results.model import read_results, to_json, without_timings
 from hippodrome.eval.sweep.cell import CellResult
 
 TINY = """\

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from hippodrome.eval.results import ErrorSummary, LocalizationSummary, Network, Row, ScenarioResult
+from hippodrome.eval.results.model import (
+    ErrorSummary,
+    LocalizationSummary,
+    Network,
+    Row,
+    ScenarioResult,
+)
 from hippodrome.eval.sweep.cell import CellResult, Samples
 from hippodrome.eval.sweep.grid import Cell
 from hippodrome.eval.sweep.table import pooled_rows, sweep_markdown

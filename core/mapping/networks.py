@@ -1,0 +1,102 @@
+"""The attractor networks while mapping: a parallel state beside the experience map, recorded at every vertex.
+
+They begin once the memory could recognise a place: before that nothing can be injected and path integration alone is exact, so
+the earlier vertices' states follow from dead reckoning; and by then the typical step, which the tori's periods need, is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from hippodrome.core.attractors import grid_cells, head_direction
+from hippodrome.core.attractors.attractor import AttractorConfig
+from hippodrome.core.attractors.grid_cells import GRID_INFORMATION, GridState
+from hippodrome.core.attractors.head_direction import HeadDirectionState
+from hippodrome.core.types import AttractorStates, FloatArray
+
+
+@dataclass(frozen=True)
+class MapperAttractorConfig:
+    """Networks of the mapper and how strongly a recognised place speaks to them."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
+
+    head: AttractorConfig = field(default_factory=AttractorConfig)
+    grid: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=GRID_INFORMATION))
+    injection_share: float = 0.1  # of the total information E, per recognised view
+    period_spacings: float = 20.0  # smallest torus period in view spacings: about 100 m at 5 m
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.injection_share <= 1.0 or self.period_spacings <= 0.0:
+            raise ValueError("mapper attractor: injection_share must lie in (0, 1] and period_spacings be positive")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NeuralPose:
+    """State of the networks; ``position`` (2 populations, 2 axes) unwraps the tori."""
+
+    head: HeadDirectionState
+    grid: GridState
+    position: FloatArray
+
+    @property
+    def pose(self) -> FloatArray:
+        """Read-out (3,) of Eqs. (15)-(16), Li et al. 2025, in map units and rad."""
+        heading_rad, _ = head_direction.read_out(self.head)
+        position, _ = grid_cells.read_out(self.grid, self.position[0])
+        return np.array([position[0], position[1], heading_rad])
+
+
+def begin(pose: FloatArray, spacing: float, config: MapperAttractorConfig) -> NeuralPose:
+    """Networks that know where they are, (3,): the integrators hold E, the calibration cells their share of it."""
+    period = grid_cells.module_periods(config.period_spacings * spacing)
+    head = head_direction.known(float(pose[2]), config.head)
+    return NeuralPose(head, grid_cells.known(pose[:2], period, config.grid), np.tile(pose[:2], (2, 1)))
+
+
+def path_integrate(state: NeuralPose, motion: FloatArray, dt_s: float, config: MapperAttractorConfig) -> NeuralPose:
+    """One body motion (3,) into both networks, then mutual and global inhibition, Eqs. (3)-(7), Li et al. 2025."""
+    step = _rotated(state.head.mean_rad, motion[:2])
+    head = head_direction.integrate(state.head, float(motion[2]) / dt_s, dt_s)
+    grid = grid_cells.integrate(state.grid, step, np.zeros((2, 2)))
+    return NeuralPose(
+        head=head_direction.inhibit(head, dt_s, config.head),
+        grid=grid_cells.inhibit(grid, dt_s, config.grid),
+        position=state.position + step,
+    )
+
+
+def inject(state: NeuralPose, pose: FloatArray, config: MapperAttractorConfig) -> NeuralPose:
+    """A recognised view cell speaks for the pose (3,) at which it was made, Eqs. (13)-(14), Li et al. 2025."""
+    head = head_direction.inject(state.head, float(pose[2]), config.injection_share * config.head.information, config.head)
+    per_length = 2.0 * np.pi / state.grid.period[0]
+    strength = np.full(2, config.injection_share * config.grid.information * per_length**2)
+    grid = grid_cells.inject(state.grid, pose[:2], strength, config.grid)
+    injected = NeuralPose(head, grid, state.position)
+    return NeuralPose(head, grid, np.tile(injected.pose[:2], (2, 1)))
+
+
+def recorded(states: list[NeuralPose]) -> AttractorStates:
+    """The networks at V vertices."""
+    count = len(states)
+    modules = len(states[0].grid.period) if states else 0
+    return AttractorStates(
+        head_mean_rad=_stacked([s.head.mean_rad for s in states], (count, 2)),
+        head_reliability=_stacked([s.head.reliability for s in states], (count, 2)),
+        grid_period=states[0].grid.period.astype(np.float32) if states else np.zeros(0, dtype=np.float32),
+        grid_mean_rad=_stacked([s.grid.mean_rad for s in states], (count, modules, 2, 2)),
+        grid_reliability=_stacked([s.grid.reliability for s in states], (count, modules, 2, 2)),
+    )
+
+
+def _rotated(heading_rad: FloatArray, motion: FloatArray) -> FloatArray:
+    """A body displacement (2,) along each population's heading (2,): (2 populations, 2 axes)."""
+    cos, sin = np.cos(heading_rad), np.sin(heading_rad)
+    return np.stack([cos * motion[0] - sin * motion[1], sin * motion[0] + cos * motion[1]], axis=-1)
+
+
+def _stacked(rows: list[FloatArray], shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.float32]]:
+    return np.array(rows, dtype=np.float32).reshape(shape)

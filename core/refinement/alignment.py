@@ -1,0 +1,204 @@
+"""Where a semi-metric map lies on the road network: one similarity (scale, rotation, translation) from the start pose alone.
+
+Section III.B of Li et al. 2025 measures vertices against roads in metres and does not say how the map came by them. Here: every
+scale between wide limits and every rotation near the start heading is a hypothesis, held at the start pose. The hypotheses are
+scored on a prefix of the drive, improved there by trimmed iterative closest points (ICP), and thinned while the prefix doubles
+up to the whole map. A short prefix cannot tell scales apart (a straight road fits at any), so early rounds keep many.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hippodrome.core import se2
+from hippodrome.core.roads.geometry import RoadGeometry, interpolate
+from hippodrome.core.types import FloatArray, IntArray, StartPose
+
+_ROAD_SPACING_M = 2.0  # of the road samples: small against the truncation
+_STEP_SHARE = 0.05  # of the scale, and ...
+_STEP_M = 30.0  # ... of translation: how far one ICP step goes along what the roads leave open
+_OTHER_SCALE = 0.03  # ratio and ...
+_OTHER_TURN_RAD = 0.05  # ... angle from which an alignment counts as another one
+
+
+@dataclass(frozen=True, slots=True)
+class AlignmentConfig:
+    """How the similarity between map and network is sought."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    min_scale_m: float = 0.2  # metres per map unit: monocular maps are off by a factor, not by orders of magnitude
+    max_scale_m: float = 5.0
+    scale_step: float = 0.04  # ratio: 2 % error at 300 m from the start is 6 m, inside the reach of ICP
+    max_turn_rad: float = 0.6  # of the whole map against its first vertex, by heading drift and a wrong start heading
+    turn_step_rad: float = 0.06
+    first_prefix: int = 200  # vertices: about 1 km, some turns in every town
+    kept: tuple[int, ...] = (160, 60, 24, 12)  # hypotheses that survive each round; the last number holds from there on
+    truncation_m: float = 30.0  # a vertex farther than this from any fitting road says no more than one at this distance
+    heading_lever_m: float = 25.0  # metres that a heading error of 1 rad counts as
+    max_misfit: float = 0.75  # mean truncated distance over the truncation; maps laid out at random reach 0.6-0.7
+    trimmed_share: float = 0.85  # of the vertices drives each ICP step: the rest may lie on roads that the network lacks
+    icp_steps: int = 6
+    road_sigma_m: float = 5.0  # distance of a well aligned vertex from its road
+    bend_sigma_m: float = 10.0  # distance of the first vertex from its place under the best similarity of a bent map
+    scored_vertices: int = 150  # evenly spaced; enough to rank hypotheses
+
+
+@dataclass(frozen=True, slots=True)
+class Similarity:
+    """``p -> scale_m R(rotation) p + translation``."""
+
+    scale_m: float  # metres per map unit
+    rotation_rad: float
+    translation_m: FloatArray  # (2,)
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """The best similarity, its cost, and the cost of the best one that differs from it."""
+
+    similarity: Similarity
+    cost: float  # mean truncated distance over the truncation, 0 (perfect) to 1
+    runner_up_cost: float  # of the best hypothesis with another scale or rotation, 1 where none is left
+
+
+def apply(similarity: Similarity, poses: FloatArray) -> FloatArray:
+    """Poses (N, 3) of the map in the network frame, metres."""
+    cos, sin = np.cos(similarity.rotation_rad), np.sin(similarity.rotation_rad)
+    xy = similarity.scale_m * poses[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + similarity.translation_m
+    return np.column_stack([xy, se2.wrap(poses[:, 2] + similarity.rotation_rad)])
+
+
+def align(poses: FloatArray, start: StartPose, geometry: RoadGeometry, config: AlignmentConfig) -> Alignment:
+    """Similarity that lays the map's poses (V, 3) on the roads, given the first vertex's pose."""
+    roads = _sampled_roads(geometry, config.heading_lever_m)
+    hypotheses = _scan(start, poses[0], config)
+    prefix = min(config.first_prefix, len(poses))
+    for round_ in range(len(poses)):  # ends long before: the prefix doubles
+        sample = poses[np.unique(np.linspace(0, prefix - 1, config.scored_vertices).astype(int))]
+        costs = _costs(hypotheses, sample, roads, config)
+        hypotheses = hypotheses[np.argsort(costs, kind="stable")[: config.kept[min(round_, len(config.kept) - 1)]]]
+        for _ in range(config.icp_steps):
+            hypotheses = _icp_step(hypotheses, sample, poses[0], start, roads, config)
+        hypotheses = _distinct(hypotheses, _costs(hypotheses, sample, roads, config), config)
+        if prefix == len(poses):
+            break
+        prefix = min(2 * prefix, len(poses))
+    return _answer(hypotheses, _costs(hypotheses, sample, roads, config))
+
+
+def _scan(start: StartPose, first: FloatArray, config: AlignmentConfig) -> FloatArray:
+    """Hypotheses (H, 4): s cos, s sin, translation; every scale with every rotation, the first vertex at the start pose."""
+    steps = int(np.ceil(np.log(config.max_scale_m / config.min_scale_m) / np.log1p(config.scale_step)))
+    scales = np.geomspace(config.min_scale_m, config.max_scale_m, steps + 1)
+    turns = int(np.ceil(config.max_turn_rad / config.turn_step_rad))
+    rotations = start.heading_rad - first[2] + config.turn_step_rad * np.arange(-turns, turns + 1)
+    scale, rotation = (grid.ravel() for grid in np.meshgrid(scales, rotations, indexing="ij"))
+    a, b = scale * np.cos(rotation), scale * np.sin(rotation)
+    return np.column_stack([a, b, start.x_m - (a * first[0] - b * first[1]), start.y_m - (b * first[0] + a * first[1])])
+
+
+def _moved(hypotheses: FloatArray, poses: FloatArray) -> FloatArray:
+    """Poses (H, N, 3) under each hypothesis."""
+    a, b, tx, ty = (column[:, None] for column in hypotheses.T)
+    x, y = a * poses[:, 0] - b * poses[:, 1] + tx, b * poses[:, 0] + a * poses[:, 1] + ty
+    return np.stack([x, y, poses[:, 2] + np.arctan2(b, a)], axis=-1)
+
+
+def _nearest(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: AlignmentConfig) -> tuple[FloatArray, IntArray]:
+    """Distance (H, N) in position and heading to the nearest road sample, and that sample; infinite beyond the truncation."""
+    lifted = _lifted(_moved(hypotheses, poses), config.heading_lever_m)
+    distance, sample = roads.tree.query(lifted, distance_upper_bound=config.truncation_m)
+    shape = (len(hypotheses), len(poses))
+    return distance.reshape(shape), sample.reshape(shape)
+
+
+def _costs(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: AlignmentConfig) -> FloatArray:
+    """Mean truncated distance (H,) over the truncation and the root of the scale; infinite outside the limits.
+
+    In metres of the network a map shrunk into a junction fits best, in units of the map one blown up does. The root of the scale
+    measures half-way between both frames, where neither pays.
+    """
+    distance, _ = _nearest(hypotheses, poses, roads, config)
+    scale = np.hypot(hypotheses[:, 0], hypotheses[:, 1])
+    misfit = np.mean(np.minimum(distance, config.truncation_m), axis=1) / config.truncation_m
+    outside = (scale < config.min_scale_m) | (scale > config.max_scale_m) | (misfit > config.max_misfit)
+    return np.where(outside, np.inf, misfit / np.sqrt(scale))
+
+
+def _icp_step(
+    hypotheses: FloatArray, poses: FloatArray, first: FloatArray, start: StartPose, roads: _Roads, config: AlignmentConfig
+) -> FloatArray:
+    """One trimmed point-to-line step of every hypothesis: linear in (s cos, s sin, translation)."""
+    distance, sample = _nearest(hypotheses, poses, roads, config)
+    trim = np.quantile(distance, config.trimmed_share, axis=1, method="higher")
+    used = np.isfinite(distance) & (distance <= trim[:, None])
+    sample = np.where(used, sample, 0)
+    normal, offset = roads.normal[sample], np.sum(roads.normal[sample] * roads.xy[sample], axis=-1)
+    rows = _rows(normal, poses[:, 0], poses[:, 1]) * used[..., None]
+    normal_matrix = np.einsum("hni,hnj->hij", rows, rows) / config.road_sigma_m**2
+    right = np.einsum("hni,hn->hi", rows, offset * used) / config.road_sigma_m**2
+    held = _rows(np.eye(2), first[0], first[1]) / np.hypot(start.sigma_m, config.bend_sigma_m)
+    target = np.array([start.x_m, start.y_m]) / np.hypot(start.sigma_m, config.bend_sigma_m)
+    stay = np.stack([_STEP_SHARE * np.hypot(hypotheses[:, 0], hypotheses[:, 1])] * 2 + [np.full(len(hypotheses), _STEP_M)] * 2)
+    prior = stay.T**-2.0
+    normal_matrix += held.T @ held + prior[:, :, None] * np.eye(4)
+    right += held.T @ target + prior * hypotheses
+    return np.linalg.solve(normal_matrix, right[..., None])[..., 0]
+
+
+def _rows(normal: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Derivatives (..., 4) of normal . (similarity of (x, y)) by (s cos, s sin, translation)."""
+    n_x, n_y = normal[..., 0], normal[..., 1]
+    return np.stack([n_x * x + n_y * y, n_y * x - n_x * y, n_x, n_y], axis=-1)
+
+
+def _distinct(hypotheses: FloatArray, costs: FloatArray, config: AlignmentConfig) -> FloatArray:
+    """The hypotheses by rising cost, those that ICP has brought together once."""
+    order = np.argsort(costs, kind="stable")
+    log_scale = np.log(np.hypot(hypotheses[order, 0], hypotheses[order, 1]))
+    cell = np.column_stack([log_scale / config.scale_step, _rotation(hypotheses[order]) / config.turn_step_rad])
+    _, first = np.unique(np.round(2.0 * cell).astype(int), axis=0, return_index=True)
+    return hypotheses[order[np.sort(first)]]
+
+
+def _rotation(hypotheses: FloatArray) -> FloatArray:
+    return np.arctan2(hypotheses[:, 1], hypotheses[:, 0])
+
+
+def _answer(hypotheses: FloatArray, costs: FloatArray) -> Alignment:
+    """The cheapest hypothesis, and the cheapest one that is 3 % in scale or 3 degrees away from it."""
+    order = np.argsort(costs, kind="stable")
+    best, scale = order[0], np.hypot(hypotheses[:, 0], hypotheses[:, 1])
+    turn = np.abs(se2.wrap(_rotation(hypotheses) - _rotation(hypotheses)[best]))
+    other = (np.abs(np.log(scale / scale[best])) > _OTHER_SCALE) | (turn > _OTHER_TURN_RAD)
+    similarity = Similarity(float(scale[best]), float(_rotation(hypotheses)[best]), hypotheses[best, 2:])
+    return Alignment(similarity, float(costs[best]), float(np.min(costs[other], initial=1.0)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Roads:
+    """Lane samples with a spatial index over (x, y, lever cos heading, lever sin heading)."""
+
+    xy: FloatArray
+    normal: FloatArray
+    tree: cKDTree
+
+
+def _sampled_roads(geometry: RoadGeometry, lever_m: float) -> _Roads:
+    pieces = np.maximum(1, np.ceil(geometry.lane_length_m / _ROAD_SPACING_M).astype(np.int32))
+    lane = np.repeat(np.arange(len(pieces), dtype=np.int32), pieces)
+    piece = np.arange(len(lane)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    pose = interpolate(geometry, lane, (piece + 0.5) / pieces[lane] * geometry.lane_length_m[lane])
+    normal = np.column_stack([-np.sin(pose[:, 2]), np.cos(pose[:, 2])])
+    return _Roads(pose[:, :2], normal, cKDTree(_lifted(pose, lever_m)))
+
+
+def _lifted(poses: FloatArray, lever_m: float) -> FloatArray:
+    """Poses (..., 3) as points (N, 4) whose distance mixes position and heading."""
+    flat = poses.reshape(-1, 3)
+    return np.column_stack([flat[:, :2], lever_m * np.cos(flat[:, 2]), lever_m * np.sin(flat[:, 2])])

@@ -1,0 +1,202 @@
+"""RC-HMM as the paper has it (mode ``paper``), Section III.B of Li et al. 2025: align, match, optimise.
+
+Where the paper is silent: the map comes into the network frame by ``alignment.align``; the closures that the map itself
+contradicts are left out, because Eq. (11) has no robust norm; matching and optimisation may alternate (``rounds``; the paper: 1).
+A map whose J stays high is bent on to the roads from its beginning (``grow``), with its closures and without; the least J wins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from hippodrome.core import se2
+from hippodrome.core.matching.hmm.match import MatchedPath, PaperMatchConfig, match
+from hippodrome.core.refinement.alignment import (
+    Alignment,
+    AlignmentConfig,
+    align,
+    apply,
+)
+from hippodrome.core.roads.geometry import RoadGeometry, road_geometry
+from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.solvers.gauss_newton import gauss_newton
+from hippodrome.core.solvers.pose_costs import global_residual, local_residual, total_residual
+from hippodrome.core.types import CognitiveMap, EdgeKind, Edges, FloatArray, Refinement, RoadMatch, StartPose
+
+BoolArray: TypeAlias = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class PaperRefineConfig:
+    """Mode ``paper``."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
+    matching: PaperMatchConfig = field(default_factory=PaperMatchConfig)
+    rounds: int = 4  # of match and optimise; each undoes some of the along-track error of the last projection
+    local_weight: float = 1.0  # w_l of Eq. (12)
+    global_weight: float = 0.16  # w_g of Eq. (12), 1/m^2: 2.5 m from its matched position cost a vertex 1 sigma
+    closure_gate_sigma: float = 4.0  # closures farther than this from the map's own poses are left out
+    min_sigma: tuple[float, float, float] = (0.05, 0.05, 0.005)  # floor of the edges' sigma: map units, map units, rad
+    max_iterations: int = 20
+    bent_cost: float = 2.0  # J per vertex above which the map is taken to be too bent for one similarity: ``grow`` is tried
+    growth_prefix: int = 300  # vertices laid on the roads as one piece: enough turns to find the scale, too few to drift
+    growth_step: int = 10  # vertices: over 50 m a map runs off by less than the distance between roads
+    growth_window: int = 80  # vertices that are still bent, and that tell the local scale; what lies farther back has settled
+    growth_rounds: int = 2
+
+
+def refine_paper(cognitive_map: CognitiveMap, network: RoadNetwork, start: StartPose, config: PaperRefineConfig) -> Refinement:
+    """The topometric map: vertices in the network frame, metres, each with its place on the roads or the reason why not."""
+    geometry = road_geometry(network)
+    answer = _whole(cognitive_map, geometry, start, config)
+    for source in (cognitive_map, without_closures(cognitive_map)):
+        if answer.cost_per_vertex > config.bent_cost:
+            answer = min(answer, _grown(source, geometry, start, config), key=lambda item: item.cost_per_vertex)
+    return _refinement(cognitive_map, network, answer)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Answer:
+    poses: FloatArray
+    alignment: Alignment
+    matched: MatchedPath
+    cost_per_vertex: float  # J of Eq. (12) over V
+    grown: bool
+
+
+def _whole(cognitive_map: CognitiveMap, geometry: RoadGeometry, start: StartPose, config: PaperRefineConfig) -> _Answer:
+    """The map laid on the roads as one piece, then matched and optimised."""
+    alignment = align(cognitive_map.poses, start, geometry, config.alignment)
+    edges = metric_edges(trusted_edges(cognitive_map, config), alignment.similarity.scale_m)
+    return _matched_answer(apply(alignment.similarity, cognitive_map.poses), alignment, edges, geometry, config, False)
+
+
+def _grown(cognitive_map: CognitiveMap, geometry: RoadGeometry, start: StartPose, config: PaperRefineConfig) -> _Answer:
+    """Only a prefix laid on the roads as one piece, the rest bent on to them as ``grow`` does."""
+    prefix = cognitive_map.poses[: config.growth_prefix]
+    alignment = align(prefix, start, geometry, config.alignment)
+    edges = metric_edges(trusted_edges(cognitive_map, config), alignment.similarity.scale_m)
+    poses = grow(apply(alignment.similarity, cognitive_map.poses), edges, geometry, config)
+    return _matched_answer(poses, alignment, edges, geometry, config, True)
+
+
+def _matched_answer(
+    poses: FloatArray, alignment: Alignment, edges: Edges, geometry: RoadGeometry, config: PaperRefineConfig, grown: bool
+) -> _Answer:
+    """``rounds`` of match and optimise; the last match is the one that the poses rest on."""
+    matched = match(poses, geometry, config.matching)
+    poses, cost = optimise(poses, edges, matched, config)
+    for _ in range(config.rounds - 1):
+        matched = match(poses, geometry, config.matching)
+        poses, cost = optimise(poses, edges, matched, config)
+    unmatched = float(np.sum(matched.lane < 0)) * config.global_weight * config.matching.radius_m**2  # as if at the radius
+    return _Answer(poses, alignment, matched, (cost + unmatched) / len(poses), grown)
+
+
+def grow(poses: FloatArray, edges: Edges, geometry: RoadGeometry, config: PaperRefineConfig) -> FloatArray:
+    """Bend an aligned map on to the roads from its beginning: match and optimise a window, carry the rest along, move on.
+
+    For maps that no similarity fits: heading and scale may drift as far as they like if they do so slowly.
+    """
+    scale = 1.0  # of the window against the whole map
+    for end in range(config.growth_step, len(poses) + config.growth_step, config.growth_step):
+        end = min(end, len(poses))
+        begin = max(0, end - config.growth_window)
+        inner, window = metric_edges(_edges_within(edges, begin, end), scale), poses[begin:end]
+        for _ in range(config.growth_rounds):
+            window, _ = optimise(window, inner, match(window, geometry, config.matching), config)
+        stretch = _stretch(window, inner)
+        scale *= stretch
+        rest = se2.between(poses[end - 1], poses[end:]) * [stretch, stretch, 1.0]
+        poses = np.concatenate([poses[:begin], window, se2.compose(window[-1], rest)])
+    return poses
+
+
+def _stretch(poses: FloatArray, edges: Edges) -> float:
+    """Length of the odometry edges as optimised over their length as measured."""
+    odometry = _subset(edges, edges.kind == EdgeKind.ODOMETRY)
+    driven_m = np.linalg.norm(poses[odometry.target, :2] - poses[odometry.source, :2], axis=1).sum()
+    measured_m = np.linalg.norm(odometry.motion[:, :2], axis=1).sum()
+    return float(driven_m / measured_m) if measured_m > 0.0 else 1.0
+
+
+def _edges_within(edges: Edges, begin: int, end: int) -> Edges:
+    """Edges between the vertices begin:end, which are counted from 0."""
+    low, high = np.minimum(edges.source, edges.target), np.maximum(edges.source, edges.target)
+    kept = (low >= begin) & (high < end)
+    inner = _subset(edges, kept)
+    return replace(inner, source=inner.source - np.int32(begin), target=inner.target - np.int32(begin))
+
+
+def _subset(edges: Edges, kept: BoolArray) -> Edges:
+    return Edges(
+        edges.source[kept], edges.target[kept], edges.motion[kept], edges.sigma[kept], edges.kind[kept], edges.margin[kept]
+    )
+
+
+def without_closures(cognitive_map: CognitiveMap) -> CognitiveMap:
+    """The same drive as dead reckoning has it: false closures that agree with each other ruin a map past mending."""
+    edges, visits = cognitive_map.edges, cognitive_map.visits
+    kept = edges.kind == EdgeKind.ODOMETRY
+    poses = cognitive_map.poses.copy()
+    poses[visits.vertex] = se2.integrate(cognitive_map.poses[visits.vertex[0]], visits.motion)
+    return replace(cognitive_map, poses=poses, edges=_subset(edges, kept))
+
+
+def trusted_edges(cognitive_map: CognitiveMap, config: PaperRefineConfig) -> Edges:
+    """The edges less those closures that lie ``closure_gate_sigma`` from the poses of the map, sigmas floored, in map units."""
+    edges, poses = cognitive_map.edges, cognitive_map.poses
+    sigma = np.maximum(edges.sigma, config.min_sigma)
+    residual, _ = local_residual(poses, edges.source, edges.target, edges.motion, sigma)
+    distance = np.linalg.norm(residual.reshape(-1, 3), axis=1)
+    kept = (edges.kind != EdgeKind.CLOSURE) | (distance <= config.closure_gate_sigma)
+    return _subset(replace(edges, sigma=sigma), kept)
+
+
+def metric_edges(edges: Edges, scale_m: float) -> Edges:
+    """p_ab of Eq. (11), Li et al. 2025, in metres: the motions and their sigmas times the alignment's scale."""
+    metres = np.array([scale_m, scale_m, 1.0])
+    return replace(edges, motion=edges.motion * metres, sigma=edges.sigma * metres)
+
+
+def optimise(poses: FloatArray, edges: Edges, matched: MatchedPath, config: PaperRefineConfig) -> tuple[FloatArray, float]:
+    """Minimum of Eq. (12), Li et al. 2025, by Gauss-Newton, and its J. Unmatched vertices hang on their edges alone."""
+    vertex = np.flatnonzero(matched.lane >= 0).astype(np.int32)
+
+    def linearise(state: FloatArray) -> tuple[FloatArray, csr_array]:
+        at = state.reshape(-1, 3)
+        local = local_residual(at, edges.source, edges.target, edges.motion, edges.sigma)
+        on_road = global_residual(at, vertex, matched.matched_m[vertex])
+        return total_residual(local, on_road, config.local_weight, config.global_weight)
+
+    damping = 1e-6  # holds what no match determines; against the weight of one matched vertex it moves nothing
+    found = gauss_newton(linearise, poses.ravel(), max_iterations=config.max_iterations, tolerance=1e-4, damping=damping)
+    poses = found.state.reshape(-1, 3)
+    return np.column_stack([poses[:, :2], se2.wrap(poses[:, 2])]), 2.0 * found.cost
+
+
+def _refinement(cognitive_map: CognitiveMap, network: RoadNetwork, answer: _Answer) -> Refinement:
+    matched, alignment = answer.matched, answer.alignment
+    road_match = RoadMatch(network.lane_ids, matched.lane, matched.position_m, matched.status)
+    log_scale = np.full(len(answer.poses), np.log(alignment.similarity.scale_m))
+    refined = replace(
+        cognitive_map, frame="network", poses=answer.poses, log_scale=log_scale, covariance=None, road_match=road_match
+    )
+    estimates = {
+        "scale_m_per_unit": alignment.similarity.scale_m,
+        "alignment_cost": alignment.cost,
+        "alignment_runner_up_cost": alignment.runner_up_cost,
+        "grown": float(answer.grown),
+        "cost_per_vertex": answer.cost_per_vertex,
+        "sigma_z_m": matched.sigma_z_m,
+        "beta_m": matched.beta_m,
+        "matched_share": float(np.mean(matched.lane >= 0)),
+    }
+    return Refinement(refined, matched.breaks, estimates)

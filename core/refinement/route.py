@@ -1,0 +1,143 @@
+"""RC-HMM beyond the paper (mode ``default``): route search on raw motions, then refinement to decimetres.
+
+Start and scale are unknown. The vertices hang on the line of the matched route (point to line, robust), on raw odometry with
+a drifting scale and a gyro whose gain and bias are estimated, and on the loop closures that agree with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import numpy as np
+
+from hippodrome.core.matching.lane_choice import beside_others, changing, choose_lanes
+from hippodrome.core.matching.route_line import RouteLine, route_line
+from hippodrome.core.matching.search.config import RouteSearchConfig
+from hippodrome.core.matching.search.route import Route, search_route
+from hippodrome.core.matching.trust import (
+    ConfidenceConfig,
+    breaks,
+    judge,
+    settled,
+)
+from hippodrome.core.refinement.solver import Solution, SolverConfig, optimise
+from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.types import (
+    CognitiveMap,
+    EdgeKind,
+    Edges,
+    FloatArray,
+    IntArray,
+    MatchStatus,
+    Refinement,
+    RoadMatch,
+    StartPose,
+    UInt8Array,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class DefaultRefineConfig:
+    """Mode ``default``."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    search: RouteSearchConfig = field(default_factory=RouteSearchConfig)
+    confidence: ConfidenceConfig = field(default_factory=ConfidenceConfig)
+    solver: SolverConfig = field(default_factory=SolverConfig)
+
+
+def refine_default(
+    cognitive_map: CognitiveMap, network: RoadNetwork, config: DefaultRefineConfig, start: StartPose | None = None
+) -> Refinement:
+    """The topometric map, from an unknown start unless one is given."""
+    visits, edges = cognitive_map.visits, closure_edges(cognitive_map)
+    route = search_route(visits, network, config.search, start)
+    status = judge(route, config.confidence, edges, start is not None)[route.track.visit_samples()]
+    vouched = (status != MatchStatus.OFF_NETWORK).astype(np.float64)
+    log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
+    line, arc = _line(route, network)
+    free = beside_others(line, network)
+    solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
+    if np.any(free):
+        line, arc = _line(choose_lanes(solution.state.poses, vouched > 0.0, network, config.search), network)
+        log_scale, free = solution.state.log_scale, changing(line, network)
+        solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
+    status = settled(status, route, solution.state.poses, config.confidence)
+    return _refinement(cognitive_map, network, line, solution, status)
+
+
+def _line(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArray]:
+    """The route's line, and where each visit lies on it (S,)."""
+    line, state_arc = route_line(route, network)
+    return line, np.interp(route.track.visit_arc, route.track.arc, state_arc)
+
+
+def closure_edges(cognitive_map: CognitiveMap) -> Edges:
+    """The closures, with the first visit of each vertex in place of the vertex."""
+    edges = cognitive_map.edges
+    kept = edges.kind == EdgeKind.CLOSURE
+    first = first_visits(cognitive_map)
+    return Edges(
+        source=first[edges.source[kept]],
+        target=first[edges.target[kept]],
+        motion=edges.motion[kept],
+        sigma=edges.sigma[kept],
+        kind=edges.kind[kept],
+        margin=edges.margin[kept],
+    )
+
+
+def first_visits(cognitive_map: CognitiveMap) -> IntArray:
+    """Index (V,) of the visit that made each vertex."""
+    order = np.arange(len(cognitive_map.visits.vertex), dtype=np.int32)
+    first = np.zeros(len(cognitive_map.poses), dtype=np.int32)
+    first[cognitive_map.visits.vertex[::-1]] = order[::-1]
+    return first
+
+
+def _refinement(
+    cognitive_map: CognitiveMap, network: RoadNetwork, line: RouteLine, solution: Solution, visit_status: UInt8Array
+) -> Refinement:
+    first = first_visits(cognitive_map)
+    status = visit_status[first]
+    refined = replace(
+        cognitive_map,
+        frame="network",
+        poses=solution.state.poses[first],
+        log_scale=solution.state.log_scale[first],
+        covariance=_covariance(solution.covariance[first][:, :3, :3], network, status),
+        road_match=_road_match(network, line, solution.arc_m[first], status),
+    )
+    return Refinement(refined, breaks(status), _estimates(solution))
+
+
+def _road_match(network: RoadNetwork, line: RouteLine, arc_m: FloatArray, status: UInt8Array) -> RoadMatch:
+    sample = np.clip(np.searchsorted(line.arc_m, arc_m), 0, len(line.arc_m) - 1)
+    matched = (status == MatchStatus.MATCHED) & (line.lane[sample] >= 0)
+    lane = np.where(matched, line.lane[sample], -1).astype(np.int32)
+    position = np.clip(line.position_m[sample] + arc_m - line.arc_m[sample], 0.0, network.lane_lengths_m()[lane])
+    return RoadMatch(network.lane_ids, lane, np.where(matched, position, np.nan), status)
+
+
+def _covariance(covariance: FloatArray, network: RoadNetwork, status: UInt8Array) -> FloatArray:
+    """Where the route is ambiguous, the place is as good as unknown: the variance of a place anywhere in the network is added."""
+    anywhere = np.diag([*np.var(network.points_m, axis=0), 0.0])
+    added: FloatArray = covariance + (status == MatchStatus.AMBIGUOUS)[:, None, None] * anywhere
+    return added
+
+
+def _estimates(solution: Solution) -> dict[str, float]:
+    noise = solution.noise
+    return {
+        "odometry_along_m_per_root_m": noise.along,
+        "odometry_across_m_per_root_m": noise.across,
+        "odometry_heading_rad_per_root_m": noise.heading,
+        "log_scale_per_root_m": noise.log_scale,
+        "lateral_sigma_m": noise.lateral_m,
+        "lane_heading_sigma_rad": noise.lane_heading_rad,
+        "closure_sigma_factor": noise.closure_factor,
+        "gyro_gain_error": float(solution.state.gyro[0]),
+        "gyro_bias_radps": float(solution.state.gyro[1]),
+    }

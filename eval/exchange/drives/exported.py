@@ -1,0 +1,128 @@
+"""What there is to export: drives with their frames, trajectories, maps and roads, gathered from a folder of results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.types import CognitiveMap, HippodromeError, Trajectory
+from hippodrome.eval.files.trajectories import read_tum
+from hippodrome.eval.methods.stages import dead_reckoning
+from hippodrome.proto.codec import load_map
+from hippodrome.sim.files import sha256_of
+from hippodrome.sim.network import read_network
+from hippodrome.sim.recording import MANIFEST, Recording, open_recording
+
+TRUTH = {"mapping": "ground-truth", "localization": "localization-ground-truth"}
+LOCALIZED = "-localization"  # ends the names of estimates that belong to the localization drive
+DEAD_RECKONING = "dead-reckoning"
+
+
+class ExchangeError(HippodromeError):
+    """A folder that cannot be exported, or a foreign drive that cannot be imported."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """A method's trajectory. ``frame`` "network": metres in the road network's frame; "own": map units from its own start."""
+
+    trajectory: Trajectory
+    frame: Literal["network", "own"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExportedDrive:
+    """One drive and everything that is known of it."""
+
+    name: str
+    recording: Recording
+    truth: Trajectory | None
+    estimates: dict[str, Estimate]
+    maps: dict[str, CognitiveMap]
+    network: RoadNetwork | None
+
+
+def gather_drives(folder: Path, network: Path | None) -> list[ExportedDrive]:
+    """The drives of a recording, of a scenario's folder or of a whole run. Raises HippodromeError."""
+    if (folder / MANIFEST).exists():
+        recording = open_recording(folder)
+        return [_drive(folder.name, recording, {}, {}, network or _network_file(recording, folder.parent.parent))]
+    scenarios = [folder] if _is_scenario(folder) else sorted(path for path in _folders(folder) if _is_scenario(path))
+    if not scenarios:
+        raise ExchangeError(
+            f"{folder}: neither a recording ({MANIFEST}) nor results ({TRUTH['mapping']}.tum); give DIR of `hippodrome eval`"
+        )
+    return [drive for scenario in scenarios for drive in _scenario_drives(scenario, network)]
+
+
+def truth_of(recording: Recording) -> Trajectory | None:
+    """The reference where it is known: an imported drive may have it for a part, or not at all."""
+    truth = recording.ground_truth()
+    known = np.isfinite(truth.poses).all(axis=1)
+    return Trajectory(truth.t_s[known], truth.poses[known]) if known.any() else None
+
+
+def _scenario_drives(folder: Path, network: Path | None) -> Iterator[ExportedDrive]:
+    """The mapping and the localization drive of one scenario; drives whose recording is gone cannot be exported."""
+    root = folder.parent
+    estimates = {path.stem: read_tum(path) for path in sorted(folder.glob("*.tum"))}
+    maps = {path.stem: load_map(path)[0] for path in sorted(folder.glob("*.pbstream"))}
+    for role, reference in TRUTH.items():
+        if (truth := estimates.get(reference)) is None:
+            continue
+        recording = _recording_of(truth, root, f"{folder.name}-{role}-*")
+        mine = {name: value for name, value in estimates.items() if _role_of(name) == role and name not in TRUTH.values()}
+        name, roads = f"{folder.name}-{role}", network or _network_file(recording, root)
+        yield _drive(name, recording, mine, maps, roads)
+
+
+def _drive(
+    name: str, recording: Recording, found: dict[str, Trajectory], maps: dict[str, CognitiveMap], network: Path | None
+) -> ExportedDrive:
+    estimates = {method: Estimate(trajectory, _frame_of(method)) for method, trajectory in found.items()}
+    if DEAD_RECKONING not in estimates:
+        estimates[DEAD_RECKONING] = Estimate(dead_reckoning(recording.self_motion())[0], "own")
+    roads = read_network(network) if network is not None else None
+    return ExportedDrive(name, recording, truth_of(recording), estimates, maps, roads)
+
+
+def _frame_of(method: str) -> Literal["network", "own"]:
+    """Refinement and localization answer in the network's frame, everything else in a frame of its own."""
+    return "network" if method.startswith("topometric") else "own"
+
+
+def _role_of(stem: str) -> str:
+    return "localization" if stem.endswith(LOCALIZED) or stem == TRUTH["localization"] else "mapping"
+
+
+def _recording_of(truth: Trajectory, root: Path, pattern: str) -> Recording:
+    """The recording that was evaluated: of several with the same name, the one with the same truth."""
+    for path in sorted((root / "recordings").glob(pattern)):
+        if (path / MANIFEST).exists():
+            recording = open_recording(path)
+            samples = recording.samples
+            if np.array_equal(samples.t_s, truth.t_s) and np.array_equal(samples.poses_m[:, :2], truth.poses[:, :2]):
+                return recording
+    raise ExchangeError(f"{root / 'recordings' / pattern}: no finished recording of this drive; run `hippodrome render` for it")
+
+
+def _network_file(recording: Recording, root: Path) -> Path | None:
+    """The network that was driven, found by its content below ``root``; None where it lies elsewhere."""
+    wanted = recording.manifest.get("network_sha256")
+    return next((path for path in sorted((root / "towns").glob("*.net.xml*")) if sha256_of(path) == wanted), None)
+
+
+def _is_scenario(folder: Path) -> bool:
+    return (folder / f"{TRUTH['mapping']}.tum").exists()
+
+
+def _folders(folder: Path) -> list[Path]:
+    try:
+        return [path for path in folder.iterdir() if path.is_dir()]
+    except OSError as error:
+        raise ExchangeError(f"{folder}: cannot be read: {error.strerror}") from None

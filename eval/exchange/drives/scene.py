@@ -1,0 +1,71 @@
+"""A drive as a viewer shows it: where estimates with a frame of their own are laid, and how much of a map there is when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hippodrome.core import se2
+from hippodrome.core.types import CognitiveMap, EdgeKind, FloatArray
+from hippodrome.eval.exchange.drives.exported import ExportedDrive
+
+GROWTH_S = 5.0  # between two states of a growing map: some 40 m of road, and few enough to keep a file small
+NETWORK_FRAME, VEHICLE_FRAME, CAMERA_FRAME = "network", "vehicle", "camera"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapState:
+    """A map as far as it was made by ``t_s``; vertices lie where the finished map has them."""
+
+    t_s: float
+    path: FloatArray  # (V, 2)
+    closures: FloatArray  # (C, 2, 2) both ends of each loop closure
+
+
+def frame_id(drive: ExportedDrive, method: str) -> str:
+    """The frame in which a method's trajectory is given."""
+    return NETWORK_FRAME if drive.estimates[method].frame == "network" else f"own/{method}"
+
+
+def map_frame_id(name: str, cognitive_map: CognitiveMap) -> str:
+    """The frame in which a map's vertices are given."""
+    return NETWORK_FRAME if cognitive_map.frame == "network" else f"own/{name}"
+
+
+def own_frames(drive: ExportedDrive) -> dict[str, FloatArray]:
+    """Pose (3,) in the network's frame of each frame of a method's own: its first pose laid on the truth, nothing scaled."""
+    starts = {
+        f"own/{method}": (estimate.trajectory.t_s[0], estimate.trajectory.poses[0])
+        for method, estimate in drive.estimates.items()
+        if estimate.frame == "own"
+    }
+    for name, found in drive.maps.items():
+        if found.frame != "network":
+            starts.setdefault(f"own/{name}", (found.t_s[0], found.poses[0]))
+    return {name: _laid(drive, float(t_s), pose) for name, (t_s, pose) in starts.items()}
+
+
+def growth(cognitive_map: CognitiveMap) -> Iterator[MapState]:
+    """The map every ``GROWTH_S``, and finished at its last vertex."""
+    t_s, edges = cognitive_map.t_s, cognitive_map.edges
+    closing = edges.kind == EdgeKind.CLOSURE
+    ends = np.stack([edges.source[closing], edges.target[closing]], axis=1)
+    for until_s in (*np.arange(t_s[0] + GROWTH_S, t_s[-1], GROWTH_S), t_s[-1]):
+        count = int(np.searchsorted(t_s, until_s, side="right"))
+        known = ends[(ends < count).all(axis=1)]
+        yield MapState(float(until_s), cognitive_map.poses[:count, :2], cognitive_map.poses[known][:, :, :2])
+
+
+def lanes(drive: ExportedDrive) -> list[FloatArray]:
+    """Centrelines (n, 2) of the road network."""
+    network = drive.network
+    return [] if network is None else [network.lane_points_m(lane) for lane in range(network.lane_count)]
+
+
+def _laid(drive: ExportedDrive, t_s: float, pose: FloatArray) -> FloatArray:
+    if drive.truth is None:
+        return np.zeros(3)
+    true = se2.interpolate(drive.truth.t_s, drive.truth.poses, np.array([t_s]))[0]
+    return se2.compose(true, se2.inverse(pose))

@@ -1,0 +1,57 @@
+"""Compile and load the inner loops before anything is timed: ``python -m hippodrome.eval.methods.warm_up`` (``make setup``).
+
+Numba compiles at the first call and keeps the machine code beside the sources. A minute's drive through a very small town, seen
+through frames of noise, calls every kernel once; what it computes is thrown away.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from hippodrome.core.localization.localizer import LocalizerConfig
+from hippodrome.core.mapping.mapper import MapperConfig
+from hippodrome.core.refinement.refine import RefineConfig
+from hippodrome.core.types import HippodromeError, Observation, StartPose
+from hippodrome.eval.methods.stages import localize_recording, map_recording, refine_map
+from hippodrome.sim.drive import simulate_drive
+from hippodrome.sim.ego import EgoSpec
+from hippodrome.sim.self_motion import NOISE_LEVELS, sense_self_motion
+from hippodrome.sim.tour import TourSpec
+from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.traffic import TrafficSpec
+
+TOWN = TownSpec(kind="grid", width_m=150.0, height_m=150.0, road_km=0.9)
+RATE_HZ = 5.0
+
+
+@cache
+def warm_up() -> None:
+    """Once per process."""
+    with tempfile.TemporaryDirectory() as folder:
+        town = build_town(TOWN, 1, Path(folder))
+        drive = simulate_drive(town, TourSpec(length_m=700.0), TrafficSpec(vehicles=0), EgoSpec(), 1)
+    start = StartPose(*(float(value) for value in drive.poses_m[0]))
+    motion = sense_self_motion(drive, RATE_HZ, NOISE_LEVELS["paper"], np.random.default_rng(1))
+
+    def observations() -> Iterator[Observation]:
+        rng = np.random.default_rng(2)
+        for t_s, speed, yaw_rate in zip(motion.t_s, motion.speed, motion.yaw_rate_radps, strict=True):
+            frame = rng.integers(0, 256, (120, 160, 3), dtype=np.uint8)
+            yield Observation(float(t_s), motion.dt_s, float(speed), float(yaw_rate), frame)
+
+    cognitive_map, _ = map_recording(observations(), MapperConfig())
+    for mode in ("default", "paper"):
+        try:
+            refinement, _ = refine_map(cognitive_map, town.network, RefineConfig(mode=mode), start)
+        except HippodromeError:
+            continue  # refused is refused; what the refusal took is compiled
+        localize_recording(observations(), refinement.cognitive_map, town.network, LocalizerConfig())
+
+
+if __name__ == "__main__":
+    warm_up()

@@ -1,0 +1,211 @@
+"""Trajectory errors as pure functions (estimate, reference) -> ``Score``, equal to evo's on the same poses.
+
+Every score carries its definition; two scores with different definitions refuse comparison.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hippodrome.core import se2
+from hippodrome.core.types import FloatArray, HippodromeError, IntArray, Trajectory
+from hippodrome.eval.metrics.alignment import (
+    LABELS,
+    AlignmentName,
+    apply_to_positions,
+    find_alignment,
+)
+from hippodrome.eval.metrics.association import (
+    MAX_GAP_S,
+    MIN_COVERAGE,
+    Association,
+    associate,
+)
+
+Pairing: TypeAlias = Literal["all", "chained"]
+Indices: TypeAlias = NDArray[np.intp]
+
+PATH_TOLERANCE = 0.1  # evo's default: an "all" pair counts if its path is within 10 % of the delta
+
+
+class MetricError(HippodromeError):
+    """A score that cannot be computed from these trajectories, or two that cannot be compared."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Score:
+    """Errors of one metric over one estimate, or over several pooled ones."""
+
+    definition: str  # metric, alignment, delta, unit, pairing
+    errors_m: FloatArray  # (N,) one per sample (APE) or pair (RPE)
+    t_s: FloatArray  # (N,) when; for a pair, its second sample
+    matched: int  # estimated samples with ground truth
+    total: int  # estimated samples
+
+    @property
+    def count(self) -> int:
+        return len(self.errors_m)
+
+    @property
+    def mean_m(self) -> float:
+        return float(self.errors_m.mean())
+
+    @property
+    def median_m(self) -> float:
+        return float(np.median(self.errors_m))
+
+    @property
+    def p95_m(self) -> float:
+        return float(np.percentile(self.errors_m, 95.0))
+
+    @property
+    def max_m(self) -> float:
+        return float(self.errors_m.max())
+
+    @property
+    def rmse_m(self) -> float:
+        return float(np.sqrt(np.mean(self.errors_m**2)))
+
+
+def ape(
+    estimate: Trajectory,
+    reference: Trajectory,
+    alignment: AlignmentName = "none",
+    *,
+    max_gap_s: float = MAX_GAP_S,
+    min_coverage: float = MIN_COVERAGE,
+) -> Score:
+    """Absolute position error: distance of each estimated position to the reference at the same instant."""
+    pairs = associate(estimate, reference, max_gap_s=max_gap_s, min_coverage=min_coverage)
+    transform = find_alignment(alignment, pairs.estimate, pairs.reference)
+    moved = apply_to_positions(transform, pairs.estimate[:, :2])
+    offsets = moved[:, :2] - pairs.reference[:, :2]
+    errors_m = np.hypot(offsets[:, 0], offsets[:, 1])
+    definition = f"APE, position, m; per estimated sample; alignment {LABELS[alignment]}; {_reference_clause(max_gap_s)}"
+    return Score(definition, errors_m, pairs.t_s, len(pairs.t_s), pairs.total)
+
+
+def rpe(
+    estimate: Trajectory,
+    reference: Trajectory,
+    delta_m: float | None = None,
+    *,
+    pairing: Pairing = "all",
+    max_gap_s: float = MAX_GAP_S,
+    min_coverage: float = MIN_COVERAGE,
+) -> Score:
+    """Relative pose error, translation: motion between two samples, estimated against true, each in its own start frame.
+
+    ``delta_m=None`` pairs consecutive samples; otherwise pairs lie ``delta_m`` apart along the reference path.
+    No alignment (the error does not depend on a rigid one) and no scale correction.
+    """
+    matched = associate(estimate, reference, max_gap_s=max_gap_s, min_coverage=min_coverage)
+    first, second, clause = _pairs(matched, delta_m, pairing)
+    if len(first) == 0:
+        raise MetricError(
+            f"RPE, {clause}: no such pair among {len(matched.t_s)} samples; use a smaller delta or consecutive samples"
+        )
+    estimated = se2.between(matched.estimate[first], matched.estimate[second])
+    true = se2.between(matched.reference[first], matched.reference[second])
+    offsets = estimated[:, :2] - true[:, :2]
+    definition = f"RPE, translation, m; {clause}; no alignment, no scale correction; {_reference_clause(max_gap_s)}"
+    return Score(definition, np.hypot(offsets[:, 0], offsets[:, 1]), matched.t_s[second], len(matched.t_s), matched.total)
+
+
+def pool(scores: Sequence[Score]) -> Score:
+    """One score over the samples of several runs. Means of means would weigh runs wrongly, means of RMSEs are no RMSE."""
+    if not scores:
+        raise MetricError("no scores to pool")
+    for other in scores[1:]:
+        require_same_definition(scores[0], other)
+    return Score(
+        definition=scores[0].definition,
+        errors_m=np.concatenate([score.errors_m for score in scores]),
+        t_s=np.concatenate([score.t_s for score in scores]),
+        matched=sum(score.matched for score in scores),
+        total=sum(score.total for score in scores),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """How a candidate's error relates to a baseline's."""
+
+    definition: str
+    mean_change_m: float  # candidate - baseline
+    median_change_m: float
+    mean_ratio: float  # candidate / baseline; inf if only the baseline is perfect, 1 if both are
+
+
+def compare(candidate: Score, baseline: Score) -> Comparison:
+    """Compare two scores of one definition."""
+    require_same_definition(candidate, baseline)
+    if baseline.mean_m == 0.0:
+        ratio = 1.0 if candidate.mean_m == 0.0 else float("inf")
+    else:
+        ratio = candidate.mean_m / baseline.mean_m
+    change_m = candidate.mean_m - baseline.mean_m
+    return Comparison(candidate.definition, change_m, candidate.median_m - baseline.median_m, ratio)
+
+
+def require_same_definition(a: Score, b: Score) -> None:
+    """Raise unless the two scores measure the same thing."""
+    if a.definition != b.definition:
+        raise MetricError(f"scores of different definitions cannot be compared: '{a.definition}' and '{b.definition}'")
+
+
+def path_length_m(poses: FloatArray) -> FloatArray:
+    """Distance travelled (N,) along poses (N, 3), from chords."""
+    steps = np.diff(poses[:, :2], axis=0)
+    return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+
+
+def _pairs(matched: Association, delta_m: float | None, pairing: Pairing) -> tuple[Indices, Indices, str]:
+    """Indices of first and second samples, and how they were found."""
+    if delta_m is None:
+        first = np.flatnonzero((np.diff(matched.segment) == 0) & (np.diff(matched.index) == 1))
+        return first, first + 1, "delta 1 sample; consecutive samples"
+    along_m = path_length_m(matched.reference)
+    find = _all_pairs if pairing == "all" else _chained_pairs
+    found = [find(along_m[start:stop], delta_m) + start for start, stop in _runs(matched.segment)]
+    pairs = np.concatenate(found)
+    how = f"all pairs within {PATH_TOLERANCE:.0%}" if pairing == "all" else "chained pairs, first sample at or beyond"
+    return pairs[:, 0], pairs[:, 1], f"delta {delta_m:g} m of reference path; {how}"
+
+
+def _all_pairs(along_m: FloatArray, delta_m: float) -> Indices:
+    """From every sample to the one nearest to ``delta_m`` ahead, (K, 2); the earlier of two equally near."""
+    first = np.arange(len(along_m) - 1)
+    goal_m = along_m[first] + delta_m
+    above = np.clip(np.searchsorted(along_m, goal_m, side="left"), first + 1, len(along_m) - 1)
+    below = np.maximum(above - 1, first + 1)
+    nearer_below = np.abs(along_m[below] - along_m[first] - delta_m) <= np.abs(along_m[above] - along_m[first] - delta_m)
+    second = np.searchsorted(along_m, along_m[np.where(nearer_below, below, above)], side="left")
+    second = np.maximum(second, first + 1)  # of several samples at one place (a stop), the first, as evo's argmin
+    close = np.abs(along_m[second] - along_m[first] - delta_m) <= PATH_TOLERANCE * delta_m
+    return np.column_stack([first[close], second[close]])
+
+
+def _chained_pairs(along_m: FloatArray, delta_m: float) -> Indices:
+    """Pairs (K, 2) end to end: each ends at the first sample at least ``delta_m`` on, where the next begins."""
+    ends = [0]
+    while (following := int(np.searchsorted(along_m, along_m[ends[-1]] + delta_m, side="left"))) < len(along_m):
+        ends.append(following)
+    return np.column_stack([ends[:-1], ends[1:]]).astype(np.intp)
+
+
+def _runs(segment: IntArray) -> list[tuple[int, int]]:
+    """Start and stop of each run of equal values."""
+    cuts = np.flatnonzero(np.diff(segment)) + 1
+    bounds = [0, *cuts.tolist(), len(segment)]
+    return list(pairwise(bounds))
+
+
+def _reference_clause(max_gap_s: float) -> str:
+    return f"reference linear in time within gaps <= {max_gap_s:g} s"

@@ -1,0 +1,223 @@
+"""What the report's interactive map draws, as files beside the results: ``map.json`` and ``thumbnails.jpg``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from shapely import LineString
+
+from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.eval.methods.materials import Materials, Scored, Topometric
+from hippodrome.eval.metrics.alignment import apply_to_positions, find_alignment
+from hippodrome.eval.metrics.association import associate
+from hippodrome.eval.results.model import MAX_BYTES, ResultsError
+from hippodrome.proto.atomic import write_atomically
+from hippodrome.sim.recording import Recording
+
+MAP_JSON: Final = "map.json"
+THUMBNAILS: Final = "thumbnails.jpg"
+EVEN_FRAMES = 150  # one every 25 m of an hour's worth of town: a click finds a view of the same street
+WORST = 5  # places a method is worst at: what one reads before one looks for the cause
+APART = 10  # vertices (about 50 m) between two of them, so that they are different places
+TILE_WIDTH = 160
+COLUMNS = 12
+JPEG_QUALITY = 62  # about 3 kB a frame of 160 x 120
+TRUTH_STEP_S = 0.5  # a chord of at most 7 m, which no eye tells from the arc at town scale
+MARGIN_M = 60.0  # of road around the drive
+ROAD_TOLERANCE_M = 0.2  # below a pixel at the map's default zoom
+DECIMALS_M = 2
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+
+
+class TimedPath(_Model):
+    """Time-stamped positions in the network frame."""
+
+    t_s: list[float]
+    x_m: list[float]
+    y_m: list[float]
+
+
+class Layer(TimedPath):
+    """A method's vertices, placed as they were for scoring; an error is None where no truth is near in time."""
+
+    name: str
+    error_m: list[float | None]
+    worst: list[Annotated[int, Field(ge=0)]]  # vertices
+
+
+class LocalizedDrive(TimedPath):
+    """Where the localizer said it was, second by second, and whether it vouched for it."""
+
+    name: str
+    error_m: list[float]
+    localized: list[bool]
+
+
+class Thumbnails(_Model):
+    """Tiles of ``thumbnails.jpg``, row by row."""
+
+    t_s: list[float]
+    columns: Annotated[int, Field(gt=0)]
+    width: Annotated[int, Field(gt=0)]
+    height: Annotated[int, Field(gt=0)]
+
+
+class MapEvidence(_Model):
+    """``map.json``."""
+
+    roads: list[list[float]]  # centrelines near the driven path, each x, y, x, y, ...
+    truth: TimedPath
+    methods: list[Layer]
+    drives: list[LocalizedDrive]
+    thumbnails: Thumbnails
+    start: tuple[float, float, float]  # true pose of the first sample: m, m, degrees
+    recordings: dict[str, str]  # role: folder below ``recordings``
+    network: str  # file name
+
+
+def write_map_evidence(materials: Materials, scored: Mapping[str, Scored], found: Mapping[str, Topometric]) -> None:
+    """Roads, the true path, every method's vertices with their errors, the localized drives, and frames along the way."""
+    recording, truth = materials.mapping, materials.mapping.ground_truth()
+    layers = [_layer(method, one, truth) for method, one in scored.items()]
+    frames = _chosen_frames(recording, layers)
+    sheet, columns = _sheet(recording, frames)
+    x_m, y_m, heading_rad = (float(value) for value in truth.poses[0])
+    evidence = MapEvidence(
+        roads=_roads(materials.roads, truth.poses),
+        truth=_path(truth),
+        methods=layers,
+        drives=[_drive(method, one) for method, one in found.items()],
+        thumbnails=Thumbnails(
+            t_s=_rounded(_frame_times_s(recording)[frames]),
+            columns=columns,
+            width=TILE_WIDTH,
+            height=sheet.shape[0] // -(-len(frames) // columns),
+        ),
+        start=(x_m, y_m, math.degrees(heading_rad)),
+        recordings={"mapping": recording.folder.name, "localization": materials.drive.folder.name},
+        network=materials.town.net_file.name,
+    )
+    _, jpeg = cv2.imencode(".jpg", sheet[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    write_atomically(materials.folder / THUMBNAILS, jpeg.tobytes())
+    write_atomically(materials.folder / MAP_JSON, f"{evidence.model_dump_json()}\n".encode())
+
+
+def add_layers(folder: Path, scored: Mapping[str, Scored], truth: Trajectory) -> None:
+    """More methods into the ``map.json`` of a scenario's folder, in place of those of the same name."""
+    evidence = read_map_evidence(folder / MAP_JSON)
+    kept = [layer for layer in evidence.methods if layer.name not in scored]
+    layers = [*kept, *(_layer(method, one, truth) for method, one in scored.items())]
+    text = evidence.model_copy(update={"methods": layers}).model_dump_json()
+    write_atomically(folder / MAP_JSON, f"{text}\n".encode())
+
+
+def read_map_evidence(path: Path) -> MapEvidence:
+    """Read and validate. Raises ResultsError."""
+    try:
+        if (size := path.stat().st_size) > MAX_BYTES:
+            raise ResultsError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
+        evidence = MapEvidence.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError) as error:
+        reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
+        raise ResultsError(f"{path}: not a readable map for the report: {reason}; run `hippodrome eval` again") from error
+    for layer in evidence.methods:
+        lengths = {len(column) for column in (layer.t_s, layer.x_m, layer.y_m, layer.error_m)}
+        if len(lengths) != 1 or any(vertex >= len(layer.t_s) for vertex in layer.worst):
+            raise ResultsError(f"{path}: the columns of '{layer.name}' do not fit together; run `hippodrome eval` again")
+    return evidence
+
+
+def worst_places(errors_m: FloatArray, count: int = WORST, apart: int = APART) -> list[int]:
+    """Indices of the largest errors (N,), worst first, at least ``apart`` from one another; nan is no error."""
+    left = np.where(np.isfinite(errors_m), errors_m, -np.inf)
+    places: list[int] = []
+    while len(places) < count and len(left) and np.max(left) > -np.inf:
+        worst = int(np.argmax(left))
+        places.append(worst)
+        left[max(worst - apart + 1, 0) : worst + apart] = -np.inf
+    return places
+
+
+def _layer(method: str, one: Scored, truth: Trajectory) -> Layer:
+    pairs = associate(one.trajectory, truth)
+    placed_m = apply_to_positions(find_alignment(one.alignment, pairs.estimate, pairs.reference), one.trajectory.poses[:, :2])
+    errors_m = np.full(len(one.trajectory.t_s), np.nan)
+    errors_m[np.searchsorted(one.trajectory.t_s, one.ape.t_s)] = one.ape.errors_m
+    return Layer(
+        name=method,
+        **_columns(one.trajectory.t_s, placed_m),
+        error_m=[None if np.isnan(error) else round(float(error), DECIMALS_M) for error in errors_m],
+        worst=worst_places(errors_m),
+    )
+
+
+def _drive(method: str, one: Topometric) -> LocalizedDrive:
+    score = one.localized
+    seconds = np.unique(np.searchsorted(score.t_s, np.arange(score.t_s[0], score.t_s[-1], 1.0)))
+    at = {estimate.t_s: estimate.pose for estimate in one.localization.estimates}
+    poses = np.array([at[float(t_s)] for t_s in score.t_s[seconds]])
+    return LocalizedDrive(
+        name=method,
+        **_columns(score.t_s[seconds], poses),
+        error_m=_rounded(score.errors_m[seconds]),
+        localized=[bool(known) for known in score.localized[seconds]],
+    )
+
+
+def _roads(network: RoadNetwork, path_m: FloatArray) -> list[list[float]]:
+    low, high = path_m[:, :2].min(axis=0) - MARGIN_M, path_m[:, :2].max(axis=0) + MARGIN_M
+    lines = (network.lane_points_m(lane) for lane in range(network.lane_count))
+    near = (line for line in lines if np.all(line.max(axis=0) >= low) and np.all(line.min(axis=0) <= high))
+    return [_rounded(np.array(LineString(line).simplify(ROAD_TOLERANCE_M).coords).ravel()) for line in near]
+
+
+def _path(truth: Trajectory) -> TimedPath:
+    steps = np.unique(np.searchsorted(truth.t_s, np.arange(truth.t_s[0], truth.t_s[-1], TRUTH_STEP_S)))
+    return TimedPath(**_columns(truth.t_s[steps], truth.poses[steps]))
+
+
+def _columns(t_s: FloatArray, poses: FloatArray) -> dict[str, list[float]]:
+    return {"t_s": _rounded(t_s), "x_m": _rounded(poses[:, 0]), "y_m": _rounded(poses[:, 1])}
+
+
+def _rounded(values: FloatArray) -> list[float]:
+    return [round(float(value), DECIMALS_M) for value in values]
+
+
+def _frame_times_s(recording: Recording) -> FloatArray:
+    times_s: FloatArray = recording.samples.t_s[recording.samples.frame_steps]
+    return times_s
+
+
+def _chosen_frames(recording: Recording, layers: list[Layer]) -> list[int]:
+    """Frames spread evenly over the drive, and the one at each method's worst places."""
+    times_s = _frame_times_s(recording)
+    even = np.linspace(0, recording.frame_count - 1, EVEN_FRAMES).astype(int)
+    worst_s = np.array([layer.t_s[vertex] for layer in layers for vertex in layer.worst])
+    after = np.clip(np.searchsorted(times_s, worst_s), 1, len(times_s) - 1)
+    nearest = np.where(worst_s - times_s[after - 1] < times_s[after] - worst_s, after - 1, after)
+    return [int(number) for number in np.unique(np.concatenate([even, nearest]))]
+
+
+def _sheet(recording: Recording, frames: list[int]) -> tuple[NDArray[np.uint8], int]:
+    """All frames as tiles of one picture (RGB), row by row, and its number of columns."""
+    first = recording.frame(frames[0])
+    height = max(round(TILE_WIDTH * first.shape[0] / first.shape[1]), 1)
+    columns = min(COLUMNS, len(frames))
+    sheet = np.zeros((-(-len(frames) // columns) * height, columns * TILE_WIDTH, 3), dtype=np.uint8)
+    for place, number in enumerate(frames):
+        top, left = height * (place // columns), TILE_WIDTH * (place % columns)
+        tile = cv2.resize(recording.frame(number), (TILE_WIDTH, height), interpolation=cv2.INTER_AREA)
+        sheet[top : top + height, left : left + TILE_WIDTH] = tile
+    return sheet, columns

@@ -1,0 +1,117 @@
+"""What lies beside ``results.json`` for one scenario, read for embedding."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from hippodrome.eval.report.evidence import (
+    MAP_JSON,
+    THUMBNAILS,
+    MapEvidence,
+    read_map_evidence,
+)
+from hippodrome.eval.results.model import ResultsError
+from hippodrome.eval.results.ratios import RATIOS
+from hippodrome.eval.rivals.sequences import TABLE_TWO, SequenceRow
+
+LOSSLESS_BYTES = 120_000  # beyond, a figure is mostly photographs, which lossless coding does not shrink
+PHOTO_QUALITY = 88
+LOSSLESS = 101  # OpenCV's way of saying so
+
+CAPTIONS: Final = {  # in the order of the page; {} stands for the method
+    "maps": "Maps over ground truth (Fig. 3 B)",
+    "semi-metric-map": "Semi-metric map as built, in map units (Fig. 3 A)",
+    "errors": "Errors along the drive (Fig. 3 D–F)",
+    "violins": "Distribution of errors (Fig. 3 G–I)",
+    "-ape": "APE on the map, {} (Fig. 3 C)",
+    "localization-methods": "Localization error of all methods on one sequence (Fig. 4 E)",
+    "-localization": "Localization error over the second drive, {}",
+    "neurodynamics": "Frames, grid cells and head direction while the estimate settles (Fig. 4)",
+    "frames": "The mapping drive as the camera sees it",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A figure ready for embedding."""
+
+    caption: str
+    uri: str
+    width: int
+    height: int
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioFiles:
+    """Everything of one scenario that the page embeds; what is missing is left out of the page."""
+
+    pictures: tuple[Picture, ...]
+    evidence: MapEvidence | None
+    thumbnails: str | None  # data URI
+    sequences: tuple[SequenceRow, ...] = ()
+    ratios: Mapping[str, Any] = field(default_factory=dict)
+
+
+def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
+    """Figures, map and frames below ``out / name``. A name that is no plain folder name has none."""
+    folder = out / name
+    if Path(name).name != name or not folder.is_dir():
+        return ScenarioFiles((), None, None)
+    figures = sorted(folder.glob("*.png"), key=lambda path: (_order(path.stem), path.stem))
+    frames = folder / THUMBNAILS
+    return ScenarioFiles(
+        tuple(picture for path in figures if (picture := _picture(path)) is not None),
+        read_map_evidence(folder / MAP_JSON) if (folder / MAP_JSON).exists() else None,
+        data_uri("image/jpeg", frames.read_bytes()) if frames.exists() else None,
+        tuple(_parsed(folder / TABLE_TWO, list[SequenceRow]) or ()),
+        _parsed(folder / RATIOS, dict[str, Any]) or {},
+    )
+
+
+def _parsed(path: Path, kind: Any) -> Any:
+    """A JSON file as this type, None if there is none. Raises ResultsError."""
+    try:
+        return TypeAdapter(kind).validate_json(path.read_bytes()) if path.exists() else None
+    except ValidationError as error:
+        raise ResultsError(f"{path}: not readable: {error.errors()[0]['msg']}; run `hippodrome baselines` again") from None
+
+
+def data_uri(media_type: str, content: bytes) -> str:
+    return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
+
+
+def _picture(path: Path) -> Picture | None:
+    """The figure as WebP, a third of the PNG's size; without loss where that is small already. None if it is no picture."""
+    image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
+    if image is None:
+        return None
+    _, coded = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, LOSSLESS])
+    if len(coded) > LOSSLESS_BYTES:
+        _, coded = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, PHOTO_QUALITY])
+    height, width = image.shape[:2]
+    return Picture(_caption(path.stem), data_uri("image/webp", coded.tobytes()), width, height)
+
+
+def _kind(stem: str) -> str | None:
+    return next((key for key in CAPTIONS if stem == key or (key.startswith("-") and stem.endswith(key))), None)
+
+
+def _order(stem: str) -> int:
+    kind = _kind(stem)
+    return len(CAPTIONS) if kind is None else list(CAPTIONS).index(kind)
+
+
+def _caption(stem: str) -> str:
+    kind = _kind(stem)
+    if kind is None:
+        return stem.replace("-", " ")
+    method = stem.removesuffix(kind)
+    return CAPTIONS[kind].format("topometric (paper)" if method == "topometric-paper" else method)

@@ -1,0 +1,72 @@
+"""``report.html``: one file that holds everything a reader wants, made from ``results.json`` and the files beside it alone."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+from hippodrome.eval.report.files import read_scenario_files
+from hippodrome.eval.report.markup import Html, element, joined
+from hippodrome.eval.report.sections import scenario_section
+from hippodrome.eval.report.tables import anchor, overview
+from hippodrome.eval.results.model import Results, read_results
+from hippodrome.eval.results.paper_rows import quoted_rows
+from hippodrome.proto.atomic import write_atomically
+
+REPORT: Final = "report.html"
+# No address is ever asked for anything: pictures, style and script come from the file itself.
+POLICY: Final = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+
+
+def write_report(out: Path) -> Path:
+    """Write ``out/report.html`` from ``out/results.json``; the same files give the same bytes."""
+    path = out / REPORT
+    write_atomically(path, report_html(read_results(out / "results.json"), out).encode())
+    return path
+
+
+def report_html(results: Results, out: Path) -> str:
+    """The page; figures, maps and frames are taken from below ``out`` where they exist."""
+    quoted = quoted_rows()
+    sections = [
+        scenario_section(place, scenario, quoted, read_scenario_files(out, scenario.name))
+        for place, scenario in enumerate(results.scenarios)
+    ]
+    links = [element("a", one.name, href=f"#{anchor(place)}") for place, one in enumerate(results.scenarios)]
+    body = element(
+        "body",
+        element("header", element("h1", "Topometric maps, scored"), element("p", _lede(results)), element("nav", links)),
+        element("main", element("section", element("h2", "All scenarios"), overview(results, quoted)), sections),
+        element("footer", "Made by ", element("code", "hippodrome eval"), "; ", element("code", "hippodrome report DIR"),
+                " makes it again from results.json and the files beside it."),
+        element("dialog", element("button", element("img", alt=""), type="button", aria_label="Close")),
+        element("script", Html(_asset("map.js"))),
+    )  # fmt: skip
+    return "<!doctype html>\n" + element("html", _head(), body, lang="en") + "\n"
+
+
+def _head() -> Html:
+    return element(
+        "head",
+        element("meta", charset="utf-8"),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        element("meta", http_equiv="Content-Security-Policy", content=POLICY),
+        element("meta", name="color-scheme", content="light dark"),
+        element("title", "hippodrome report"),
+        element("style", Html(_asset("style.css"))),
+    )
+
+
+def _lede(results: Results) -> Html:
+    """What was done, in one sentence."""
+    count = len(results.scenarios)
+    km = sum(one.network.km for one in results.scenarios)
+    frames, drive_s = (sum(getattr(one, name) for one in results.scenarios) for name in ("frames", "duration_s"))
+    towns = "1 town" if count == 1 else f"{count} towns"
+    return joined(f"{towns} with {km:.1f} km of road, mapped from {frames:,} camera frames over {drive_s / 60:.0f} minutes of "
+                  "driving; each map refined with the road network, and a second drive localized in it.")  # fmt: skip
+
+
+def _asset(name: str) -> str:
+    return (files("hippodrome.eval.report") / name).read_text(encoding="utf-8")

@@ -1,0 +1,250 @@
+"""The parts of one scenario's section."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+
+from hippodrome.eval.files.scenarios import PACKAGE
+from hippodrome.eval.report import comparison
+from hippodrome.eval.report.evidence import MapEvidence
+from hippodrome.eval.report.files import Picture, ScenarioFiles
+from hippodrome.eval.report.markup import (
+    Child,
+    Html,
+    data_script,
+    element,
+    joined,
+)
+from hippodrome.eval.report.tables import (
+    anchor,
+    break_table,
+    localization_table,
+    mapping_table,
+    plain_table,
+    scrolling,
+    worst_places,
+)
+from hippodrome.eval.results.model import Row, ScenarioResult
+from hippodrome.eval.results.tables import definitions, failed_runs, scenario_title
+from hippodrome.eval.results.thresholds import failed_limits
+from hippodrome.sim.scenario import Thresholds
+
+MEANING = {"cpu_s": "s of CPU", "step_ms": "ms a step"}
+
+
+def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row], files: ScenarioFiles) -> Html:
+    """One scenario, from its verdict to how to run it again."""
+    rows = (*scenario.rows, *quoted)
+    return element(
+        "section",
+        element("h2", scenario.name, " ", _verdict(scenario)),
+        element("p", scenario_title(scenario), class_="note"),
+        _failures(scenario),
+        _headline(scenario),
+        element("h3", "Mapping (Table I)"),
+        mapping_table(scenario, quoted),
+        _titled("Localization from an unknown start (Table II)", localization_table(scenario, quoted)),
+        _titled("Ten sequences from unknown starts (Table II)", comparison.sequences(files.sequences)),
+        _titled("Cheaper than ORB-SLAM3", comparison.ratios(files.ratios)),
+        _titled("What each method is given", comparison.fairness(scenario)),
+        _folded("What each figure means", element("ul", [element("li", line) for line in definitions(rows)])),
+        _titled("Map", _interactive_map(files) if files.evidence else None),
+        _titled("Worst places", worst_places(files.evidence, files.thumbnails is not None) if files.evidence else None),
+        _titled("Breaks", break_table(scenario)),
+        _titled("Figures", _gallery(files.pictures) if files.pictures else None),
+        _titled("Stage times", _timings(scenario)),
+        element("h3", "Run it again"),
+        _commands(scenario, files.evidence),
+        _folded("Effective configuration", _configuration(scenario)),
+        id=anchor(place),
+        style=_frames_style(files),
+    )
+
+
+def _titled(title: str, content: Html | None) -> Html | None:
+    return joined(element("h3", title), content) if content else None
+
+
+def _folded(title: str, content: Child) -> Html:
+    return element("details", element("summary", title), content)
+
+
+def _verdict(scenario: ScenarioResult) -> Html | None:
+    """Whether the scenario's own limits hold."""
+    failed = _failed_limits(scenario)
+    if failed is None:
+        return None
+    return element("span", "limits failed", class_="badge bad") if failed else element("span", "limits hold", class_="badge good")
+
+
+def _failures(scenario: ScenarioResult) -> Html | None:
+    lines = [f"Limit: {line}" for line in _failed_limits(scenario) or []]
+    lines += [f"{row.method} failed: {row.failure}" for row in scenario.rows if row.failure is not None]
+    lines += failed_runs(scenario.rows)
+    return element("ul", [element("li", line) for line in lines], class_="failures") if lines else None
+
+
+def _failed_limits(scenario: ScenarioResult) -> list[str] | None:
+    limits = _extra(scenario, "configuration").get("thresholds")
+    try:
+        return failed_limits(Thresholds.model_validate(limits), scenario) if limits else None
+    except ValidationError:  # results of another version: their limits may have other names
+        return None
+
+
+def _extra(scenario: ScenarioResult, name: str) -> dict[str, Any]:
+    """A field that results may have beside the agreed ones; empty if it is missing or something else."""
+    value = getattr(scenario, name, None)
+    return value if isinstance(value, dict) else {}
+
+
+def _headline(scenario: ScenarioResult) -> Html:
+    """A method in one tile, what the run is about first: its APE, and its localization where it has one."""
+    return element("div", [_tile(row) for row in reversed(scenario.rows)], class_="tiles")
+
+
+def _tile(row: Row) -> Html:
+    if row.ape is None:
+        return element("div", element("span", row.method), element("strong", "failed", class_="bad"), class_="figure-tile")
+    details = [f"mean APE, worst {row.ape.max_m:.1f}\N{NO-BREAK SPACE}m" if row.ape.max_m is not None else "mean APE"]
+    if row.localization is not None and row.localization.error_mean_m is not None:
+        details.append(f"localized to {row.localization.error_mean_m:.2f}\N{NO-BREAK SPACE}m")
+    return element("div", element("span", row.method), element("strong", f"{row.ape.mean_m:.2f} m"),
+                   [element("small", line) for line in details], class_="figure-tile")  # fmt: skip
+
+
+def _interactive_map(files: ScenarioFiles) -> Html:
+    """The canvas with its controls; ``map.js`` brings it to life."""
+    assert files.evidence is not None
+    stage = element(
+        "div",
+        element("canvas", tabindex="0", role="img", aria_label="Ground truth and maps; arrow keys step through the vertices"),
+        element("div", class_="tip", hidden=True),
+        element("div", [element("button", sign, type="button", data_zoom=kind, aria_label=label, title=label)
+                        for sign, kind, label in (("+", "in", "Zoom in"), ("−", "out", "Zoom out"), ("⤢", "fit", "Show all"))],
+                class_="zoom"),
+        element("div", class_="scalebar", aria_hidden="true"),
+        class_="stage",
+    )  # fmt: skip
+    side = element(
+        "div",
+        element("fieldset", element("legend", "Layers"), class_="layers"),
+        element("label", element("input", type="checkbox", checked=True, class_="by-error"), "colour vertices by APE"),
+        element("div", class_="colourbar"),
+        element("label", "Vertex ", element("input", type="range", min=0, value=0, class_="scrub")),
+        element("div", class_="tile", role="img", hidden=True) if files.thumbnails else None,
+        element("p", "Hover over a vertex, click to keep it and see its camera frame.", class_="vertex", aria_live="polite"),
+        class_="side",
+    )
+    missing = element("noscript", "The interactive map needs JavaScript; the figures below show the same maps.")
+    return element("div", data_script(files.evidence), stage, side, missing,
+                   class_="map")  # fmt: skip
+
+
+def _gallery(pictures: Sequence[Picture]) -> Html:
+    return element("div", [_figure(picture) for picture in pictures], class_="gallery")
+
+
+def _figure(picture: Picture) -> Html:
+    image = element("img", src=picture.uri, alt=picture.caption, width=picture.width, height=picture.height)
+    button = element("button", image, type="button", class_="enlarge", aria_label=f"Enlarge: {picture.caption}")
+    return element("figure", button, element("figcaption", picture.caption), class_="wide" if picture.width > 1400 else None)
+
+
+def _timings(scenario: ScenarioResult) -> Html | None:
+    """CPU times with bars; those of a step have a scale of their own."""
+    figures = {name: float(value) for name, value in _extra(scenario, "timings").items() if isinstance(value, int | float)}
+    rows: list[Sequence[Child]] = []
+    for name, value in figures.items():
+        words, unit = _unit_of(name)
+        longest = max(other for key, other in figures.items() if _unit_of(key)[1] == unit)
+        share = value / longest if longest > 0.0 else 0.0
+        bar = element("span", class_="bar", style=f"--share:{share:.4f}")
+        rows.append([words, f"{value:.3g} {unit}", bar])
+    return plain_table(["Stage", "Time", ""], rows, "stage times") if rows else None
+
+
+def _unit_of(name: str) -> tuple[str, str]:
+    for ending, meaning in MEANING.items():
+        if name.endswith(ending):
+            return name.removesuffix(ending).strip("_ ").replace("_", " "), meaning
+    return name, ""
+
+
+def _commands(scenario: ScenarioResult, evidence: MapEvidence | None) -> Html:
+    """The command of each row, to be typed in the folder of the report."""
+    commands = list(_command_lines(scenario, evidence))
+    lines = [[method, element("code", _unbroken(command))] for method, command in commands]
+    others = [row.method for row in scenario.rows if row.method not in dict(commands)]
+    note = "In the folder that holds this report. Stages take the road network as it is; noise levels that survey it wrongly " \
+           "(realistic, harsh) are reproduced by eval only."  # fmt: skip
+    note += f" {', '.join(others)}: with all rows only." if others else ""
+    return joined(plain_table(["Row", "Command"], lines, "commands"), element("p", note, class_="note"))
+
+
+def _unbroken(command: str) -> list[Html]:
+    """Words that browsers do not break at their hyphens."""
+    return [joined(element("span", word), " ") for word in command.split(" ")]
+
+
+def _command_lines(scenario: ScenarioResult, evidence: MapEvidence | None) -> Iterator[tuple[str, str]]:
+    name = scenario.name
+    path = scenario.network.path
+    packaged = path is not None and path.startswith(PACKAGE)  # then the scenario itself finds it
+    network = ["--network", path if packaged else f"PATH/{path}"] if path else []
+    settings = ["--scenario", f"{name}/scenario.json"]
+    yield (
+        "all rows",
+        shlex.join(["hippodrome", "eval", f"{name}/scenario.json", *([] if packaged else network), "--out", "again"]),
+    )
+    if evidence is None or not {"mapping", "localization"} <= set(evidence.recordings):
+        return
+    roads = network or ["--network", f"towns/{evidence.network}"]
+    mapping, drive = (f"recordings/{evidence.recordings[role]}" for role in ("mapping", "localization"))
+    yield "semi-metric", shlex.join(["hippodrome", "map", mapping, *settings, "--out", "semi-metric.pbstream"])
+    for row in scenario.rows:
+        if not row.method.startswith("topometric"):
+            continue
+        mode = "paper" if row.method.endswith("(paper)") else "default"
+        start = ["--start=" + ",".join(f"{value:.6f}" for value in evidence.start)] if mode == "paper" else []
+        refined = f"topometric-{mode}.pbstream"
+        yield (
+            row.method,
+            shlex.join(
+                [
+                    "hippodrome",
+                    "refine",
+                    f"{name}/semi-metric.pbstream",
+                    *roads,
+                    "--mode",
+                    mode,
+                    *start,
+                    *settings,
+                    "--out",
+                    refined,
+                ]
+            ),
+        )
+        yield (
+            f"{row.method}, localization",
+            shlex.join(["hippodrome", "localize", f"{name}/{refined}", drive, *roads, *settings, "--out", f"{mode}.tum"]),
+        )
+
+
+def _configuration(scenario: ScenarioResult) -> Html:
+    text = json.dumps(_extra(scenario, "configuration"), indent=2, ensure_ascii=False)
+    return scrolling(element("pre", text), "effective configuration")
+
+
+def _frames_style(files: ScenarioFiles) -> str | None:
+    """The sheet of frames, once, for every tile of the section."""
+    if files.evidence is None or files.thumbnails is None:
+        return None
+    sheet = files.evidence.thumbnails
+    rows = -(-len(sheet.t_s) // sheet.columns)
+    return f"--sheet:url({files.thumbnails});--columns:{sheet.columns};--rows:{rows};--ratio:{sheet.width}/{sheet.height}"

@@ -1,0 +1,172 @@
+"""The report's tables. Wide ones scroll inside their own box, so that the page itself never does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hippodrome.eval.report.evidence import Layer, MapEvidence
+from hippodrome.eval.report.markup import (
+    Child,
+    Html,
+    element,
+    joined,
+)
+from hippodrome.eval.results.model import Results, Row, ScenarioResult
+from hippodrome.eval.results.tables import (
+    LOCALIZATION_COLUMNS,
+    MAPPING_COLUMNS,
+    NONE,
+    QUOTED_MARK,
+    QUOTED_NOTE,
+    Column,
+    filled_columns,
+    row_cells,
+)
+
+FRAME_LABEL = "camera frame at {:.0f} s"
+
+
+def scrolling(table: Html, label: str) -> Html:
+    """A table in a box of its own, reachable by keyboard."""
+    return element("div", table, class_="scroll", tabindex="0", role="region", aria_label=label)
+
+
+def plain_table(heads: Sequence[str], rows: Sequence[Sequence[Child]], label: str) -> Html:
+    """First column to the left, figures to the right."""
+    head = element("tr", [element("th", title, scope="col") for title in heads])
+    body = [element("tr", element("th", row[0], scope="row"), [element("td", cell) for cell in row[1:]]) for row in rows]
+    return scrolling(element("table", element("thead", head), element("tbody", body)), label)
+
+
+def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Sequence[Child]], label: str) -> Html:
+    """A plain table whose columns stand under a common head where they show the same figure; a lone column has no second head."""
+    top, below = [], []
+    for title, heads in groups:
+        spans: dict[str, str | int] = {"colspan": len(heads), "scope": "colgroup"} if heads else {"rowspan": 2, "scope": "col"}
+        top.append(element("th", title, **spans))
+        below += [element("th", head, scope="col") for head in heads]
+    body = [element("tr", element("th", row[0], scope="row"), [element("td", cell) for cell in row[1:]]) for row in rows]
+    head = element("thead", element("tr", top, class_="groups"), element("tr", below))
+    return scrolling(element("table", head, element("tbody", body)), label)
+
+
+def overview(results: Results, quoted: Sequence[Row]) -> Html:
+    """One line a scenario: APE of every method, and how the second drive was localized; the paper's figures below."""
+    measured = list(dict.fromkeys(row.method for scenario in results.scenarios for row in scenario.rows))[::-1]  # ours first
+    localizing = [method for method in measured if any(_located(_row(one, method)) for one in results.scenarios)]
+    groups: list[tuple[str, Sequence[str]]] = [("Scenario", ()), ("Mean APE of the map (m)", measured)]
+    groups += [("Mean localization error (m)", localizing)] if localizing else []
+    groups += [("Road (km)", ()), ("Drive (s)", ()), ("Frames", ())]
+    rows: list[Sequence[Child]] = [
+        [
+            element("a", scenario.name, href=f"#{anchor(place)}"),
+            *(_ape(_row(scenario, method)) for method in measured),
+            *(_location_error(_row(scenario, method)) for method in localizing),
+            f"{scenario.network.km:.1f}",
+            f"{scenario.duration_s:,.0f}",
+            f"{scenario.frames:,}",
+        ]
+        for place, scenario in enumerate(results.scenarios)
+    ]
+    note = element("p", f"The paper's APE: {_paper_line(quoted)} ({QUOTED_NOTE}).", class_="note") if quoted else None
+    return Html(grouped_table(groups, rows, "all scenarios") + (note or ""))
+
+
+def anchor(place: int) -> str:
+    """A scenario's place on the page; its name may hold anything."""
+    return f"scenario-{place + 1}"
+
+
+def mapping_table(scenario: ScenarioResult, quoted: Sequence[Row]) -> Html:
+    """The paper's Table I with our rows above its own."""
+    return _row_table(MAPPING_COLUMNS, [*scenario.rows, *quoted], f"{scenario.name}: mapping")
+
+
+def localization_table(scenario: ScenarioResult, quoted: Sequence[Row]) -> Html | None:
+    """Localization from an unknown start (the paper's Table II)."""
+    rows = [row for row in (*scenario.rows, *quoted) if row.localization is not None]
+    return _row_table(LOCALIZATION_COLUMNS, rows, f"{scenario.name}: localization") if rows else None
+
+
+def worst_places(evidence: MapEvidence, with_frames: bool) -> Html:
+    """Where each metric method is worst, with what the camera saw there; the button shows it on the map."""
+    layers = [layer for layer in evidence.methods if layer.name.startswith("topometric")]
+    return joined([_worst_of(layer, evidence, with_frames) for layer in layers])
+
+
+def _worst_of(layer: Layer, evidence: MapEvidence, with_frames: bool) -> Html:
+    cards = [_worst_card(layer, vertex, evidence, with_frames) for vertex in layer.worst]
+    return element("div", element("h4", layer.name), element("div", cards, class_="cards"))
+
+
+def _worst_card(layer: Layer, vertex: int, evidence: MapEvidence, with_frames: bool) -> Html:
+    t_s, error_m = layer.t_s[vertex], layer.error_m[vertex] or 0.0
+    words = joined(
+        element("strong", f"{error_m:.2f}\N{NO-BREAK SPACE}m"), element("small", f"vertex {vertex}, {t_s:.0f}\N{NO-BREAK SPACE}s")
+    )
+    return element("button", frame_tile(evidence, t_s) if with_frames else None, words, type="button", class_="goto card",
+                   data_method=layer.name, data_vertex=vertex, title="Show on the map")  # fmt: skip
+
+
+def frame_tile(evidence: MapEvidence, t_s: float) -> Html:
+    """The embedded frame nearest in time, cut out of the sheet of all."""
+    times, columns = evidence.thumbnails.t_s, evidence.thumbnails.columns
+    tile = min(range(len(times)), key=lambda place: abs(times[place] - t_s))
+    return element("div", class_="tile", role="img", aria_label=FRAME_LABEL.format(times[tile]),
+                   style=f"--column:{tile % columns};--row:{tile // columns}")  # fmt: skip
+
+
+def break_table(scenario: ScenarioResult) -> Html | None:
+    """Stretches that the road match does not vouch for, and why."""
+    rows = [
+        [row.method, f"{one.get('first_vertex')}–{one.get('last_vertex')}", _words(one.get("status")), str(one.get("cause"))]
+        for row in scenario.rows
+        for one in _dictionaries(getattr(row, "breaks", None))
+    ]
+    return plain_table(["Method", "Vertices", "Status", "Cause"], rows, "breaks") if rows else None
+
+
+def _row_table(columns: Sequence[Column], rows: Sequence[Row], label: str) -> Html:
+    columns = filled_columns(columns, rows)
+    head = element("tr", [element("th", column.title, scope="col") for column in columns])
+    body = [_row_line(row_cells(columns, row), row) for row in rows]
+    return scrolling(element("table", element("thead", head), element("tbody", body)), label)
+
+
+def _row_line(cells: Sequence[str], row: Row) -> Html:
+    style = "failed" if row.failure is not None else "quoted" if row.quoted else None
+    return element("tr", element("th", cells[0], scope="row"), [element("td", cell) for cell in cells[1:]], class_=style)
+
+
+def _row(scenario: ScenarioResult, method: str) -> Row | None:
+    return next((row for row in scenario.rows if row.method == method), None)
+
+
+def _located(row: Row | None) -> bool:
+    return row is not None and row.localization is not None
+
+
+def _dictionaries(value: object) -> list[dict[str, object]]:
+    """What of a field beside the agreed ones has the form that it should have."""
+    return [one for one in value if isinstance(one, dict)] if isinstance(value, list | tuple) else []
+
+
+def _words(status: object) -> str:
+    return str(status).lower().replace("_", " ")
+
+
+def _ape(row: Row | None) -> Child:
+    if row is None:
+        return NONE
+    return element("span", "FAILED", class_="bad") if row.ape is None else f"{row.ape.mean_m:.2f}"
+
+
+def _location_error(row: Row | None) -> Child:
+    if row is None or row.localization is None:
+        return NONE
+    error_m = row.localization.error_mean_m
+    return element("span", "never", class_="bad") if error_m is None else f"{error_m:.2f}"
+
+
+def _paper_line(quoted: Sequence[Row]) -> str:
+    return "; ".join(f"{row.method} {QUOTED_MARK} {row.ape.mean_m:g} m" for row in quoted if row.ape is not None)

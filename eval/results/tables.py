@@ -1,0 +1,239 @@
+"""Tables I and II as Markdown and on the terminal, from ``Results`` alone. Quoted rows are marked, failures keep their row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from hippodrome.eval.results.model import (
+    ErrorSummary,
+    Results,
+    Row,
+    ScenarioResult,
+)
+
+QUOTED_MARK = "†"
+QUOTED_NOTE = f"{QUOTED_MARK} quoted from the paper, another drive in another simulator; not measured here"
+NONE = "-"
+MEGABYTE = 1e6
+LEAST = 0.001  # the smallest figure that a table writes out
+
+Cell: TypeAlias = Callable[[Row], str]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    title: str
+    cell: Cell
+
+
+def _figure(value: float | None, digits: int = 2) -> str:
+    """A number with ``digits`` decimals; a smaller one with one significant digit, down to what no reader needs."""
+    if value is None:
+        return NONE
+    if value == 0.0 or abs(value) >= 10.0**-digits:
+        return f"{value:.{digits}f}"
+    return f"{value:.1g}" if abs(value) >= LEAST else f"<{LEAST}"
+
+
+def _count(value: int | None) -> str:
+    return NONE if value is None else f"{value:,}"
+
+
+def _mean(error: ErrorSummary | None) -> str:
+    return NONE if error is None else _figure(error.mean_m)
+
+
+def _spread(error: ErrorSummary | None) -> str:
+    """Median, 95th percentile and worst case."""
+    if error is None or error.median_m is None:
+        return NONE
+    return " / ".join(_figure(value) for value in (error.median_m, error.p95_m, error.max_m))
+
+
+def _map_size(row: Row) -> str:
+    return NONE if row.map_bytes is None else _figure(row.map_bytes / MEGABYTE)
+
+
+def _method(row: Row) -> str:
+    return f"{row.method} {QUOTED_MARK}" if row.quoted else row.method
+
+
+def _localization(row: Row, figure: Callable[..., str], field: str) -> str:
+    return NONE if row.localization is None else figure(getattr(row.localization, field))
+
+
+def _runs(row: Row) -> str:
+    """Lowest and highest mean of a method that is not deterministic, and how many of its runs came to nothing."""
+    spread = (row.model_extra or {}).get("ape_spread_m")
+    if not spread:
+        return NONE
+    lost, runs = len(failed_runs([row])), len((row.model_extra or {}).get("runs", ()))
+    return " to ".join(_figure(float(value)) for value in spread) + (f" ({lost} of {runs} failed)" if lost else "")
+
+
+def failed_runs(rows: Sequence[Row]) -> list[str]:
+    """What became of the runs that rows rest on in part only, a line each; a row that rests on none of them failed itself."""
+    holders: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        for run in (row.model_extra or {}).get("runs", ()) if row.failure is None else ():
+            if run.get("failure") is not None:
+                holders.setdefault((str(run["run"]), str(run["failure"])), []).append(row.method)
+    return [f"{', '.join(methods)}, {run}: {failure}" for (run, failure), methods in holders.items()]
+
+
+def _success(row: Row) -> str:
+    if row.localization is None or row.localization.success is None:
+        return NONE
+    return "yes" if row.localization.success else "NO"
+
+
+MAPPING_COLUMNS = (
+    Column("Method", _method),
+    Column("CPU (%)", lambda row: _figure(row.cpu_percent)),
+    Column("Map (MB)", _map_size),
+    Column("Peak RSS (MB)", lambda row: NONE if row.peak_rss_bytes is None else f"{row.peak_rss_bytes / MEGABYTE:.0f}"),
+    Column("Frames", lambda row: _count(row.camera_frames)),
+    Column("Keyframes", lambda row: _count(row.keyframes)),
+    Column("Vertices", lambda row: _count(row.vertices)),
+    Column("Edges", lambda row: _count(row.edges)),
+    Column("APE (m)", lambda row: _mean(row.ape)),
+    Column("APE median / p95 / max", lambda row: _spread(row.ape)),
+    Column("APE of the runs", _runs),
+    Column("RPE (m)", lambda row: _mean(row.rpe)),
+    Column("RPE 20 m (m)", lambda row: _mean(row.rpe_20m)),
+    Column("APE Sim(2) (m)", lambda row: _mean(row.ape_sim2)),
+)
+
+LOCALIZATION_COLUMNS = (
+    Column("Method", _method),
+    Column("Success", _success),
+    Column("Error (m)", lambda row: _localization(row, _figure, "error_mean_m")),
+    Column("Error p95 (m)", lambda row: _localization(row, _figure, "error_p95_m")),
+    Column("First fix (ms)", lambda row: _localization(row, _figure, "initial_time_ms")),
+    Column("First fix (m driven)", lambda row: _localization(row, lambda value: _figure(value, 1), "initial_distance_m")),
+    Column("Localized (%)", lambda row: _localization(row, _percent, "localized_share")),
+    Column("False fixes", lambda row: _localization(row, _count, "false_fixes")),
+)
+
+
+def _percent(share: float | None) -> str:
+    return NONE if share is None else f"{100.0 * share:.1f}"
+
+
+def table_one_markdown(results: Results, quoted: Sequence[Row] = ()) -> str:
+    """Per scenario: the mapping table (the paper's Table I) and the localization table, with every definition beneath."""
+    return "\n".join(_scenario_markdown(scenario, quoted) for scenario in results.scenarios)
+
+
+def _short(value: float | None) -> str:
+    """Three digits: a terminal is narrow."""
+    if value is None:
+        return NONE
+    return f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
+
+
+TERMINAL_COLUMNS = (  # fit 80 characters; table1.md has the rest
+    Column("CPU %", lambda row: _short(row.cpu_percent)),
+    Column("MB", lambda row: NONE if row.map_bytes is None else _short(row.map_bytes / MEGABYTE)),
+    Column("APE m", lambda row: NONE if row.ape is None else _short(row.ape.mean_m)),
+    Column("worst", lambda row: NONE if row.ape is None else _short(row.ape.max_m)),
+    Column("RPE m", lambda row: NONE if row.rpe is None else _short(row.rpe.mean_m)),
+    Column("20 m", lambda row: NONE if row.rpe_20m is None else _short(row.rpe_20m.mean_m)),
+    Column("loc m", lambda row: _localization(row, _short, "error_mean_m")),
+    Column("fix m", lambda row: _localization(row, _short, "initial_distance_m")),
+    Column("false", lambda row: _localization(row, _count, "false_fixes")),
+)
+TERMINAL_NOTE = (
+    "Means over the vertices: APE, its worst, RPE between consecutive vertices and over 20 m. Second drive: loc, its error "
+    "once localized; fix, metres driven until then; false, confident fixes over 20 m off."
+)
+
+
+def print_table_one(results: Results, quoted: Sequence[Row], console: Console) -> None:
+    """A narrow table per scenario, the quoted rows once, failures beneath."""
+    for scenario in results.scenarios:
+        console.print(_terminal_table(scenario_title(scenario), scenario.rows))
+        for row in scenario.rows:
+            if row.failure is not None:
+                console.print(f"{row.method}: FAILED: {row.failure}", markup=False, style="red", highlight=False)
+    if quoted:
+        console.print(_terminal_table(f"the paper {QUOTED_MARK}", quoted))
+    console.print(TERMINAL_NOTE, markup=False, style="dim", highlight=False)
+    if quoted:
+        console.print(QUOTED_NOTE, markup=False, style="dim", highlight=False)
+
+
+def _terminal_table(title: str, rows: Sequence[Row]) -> Table:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, title=Text(title, style="bold"), title_justify="left")
+    table.add_column("method", min_width=18, max_width=20)
+    for column in TERMINAL_COLUMNS:
+        table.add_column(column.title, justify="right", no_wrap=True, min_width=4)
+    for row in rows:
+        table.add_row(Text(row.method), *(column.cell(row) for column in TERMINAL_COLUMNS))
+    return table
+
+
+def scenario_title(scenario: ScenarioResult) -> str:
+    """What was driven, in one line."""
+    network = scenario.network
+    source = network.path if network.path is not None else f"generated, {network.generator}"
+    return (
+        f"{scenario.name}: {source}, {network.km:.1f} km of road, seed {scenario.seed}, noise {scenario.noise}, "
+        f"{scenario.frames:,} frames, {scenario.duration_s:,.0f} s"
+    )
+
+
+def definitions(rows: Sequence[Row]) -> list[str]:
+    """What each kind of figure in these rows means, each wording once, with the methods that it holds for."""
+    holders: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        for title, field in (("APE", row.ape), ("RPE", row.rpe), ("RPE 20 m", row.rpe_20m), ("APE Sim(2)", row.ape_sim2)):
+            if field is not None:
+                holders.setdefault((title, field.definition), []).append(_method(row))
+        if row.localization is not None:
+            holders.setdefault(("Localization", row.localization.definition), []).append(_method(row))
+    return [f"{title} ({', '.join(methods)}): {definition}" for (title, definition), methods in sorted(holders.items())]
+
+
+def _scenario_markdown(scenario: ScenarioResult, quoted: Sequence[Row]) -> str:
+    rows = (*scenario.rows, *quoted)
+    parts = [f"## {_escaped(scenario_title(scenario))}", "", _markdown_table(MAPPING_COLUMNS, rows), ""]
+    if located := _with_localization(rows):
+        parts += ["### Localization from an unknown start", "", _markdown_table(LOCALIZATION_COLUMNS, located), ""]
+    failures = [f"- {_escaped(row.method)}: FAILED: {_escaped(row.failure)}" for row in rows if row.failure is not None]
+    failures += [f"- {_escaped(line)}" for line in failed_runs(rows)]
+    notes = [f"- {_escaped(line)}" for line in definitions(rows)]
+    mark = [f"- {QUOTED_NOTE}"] if any(row.quoted for row in rows) else []
+    return "\n".join([*parts, *failures, *notes, *mark, ""])
+
+
+def _with_localization(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row.localization is not None]
+
+
+def _markdown_table(columns: Sequence[Column], rows: Sequence[Row]) -> str:
+    columns = filled_columns(columns, rows)
+    lines = [[column.title for column in columns], ["---", *["---:"] * (len(columns) - 1)]]
+    lines += [[_escaped(text) for text in row_cells(columns, row)] for row in rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def row_cells(columns: Sequence[Column], row: Row) -> list[str]:
+    cells = [column.cell(row) for column in columns]
+    return cells if row.failure is None else [f"{cells[0]} (FAILED)", *cells[1:]]
+
+
+def filled_columns(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
+    """The columns in which at least one row has something to say."""
+    return [column for column in columns if any(column.cell(row) != NONE for row in rows)]
+
+
+def _escaped(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")

@@ -1,0 +1,33 @@
+"""A scenario's limits held against its result."""
+
+from __future__ import annotations
+
+from hippodrome.eval.results.model import Row, ScenarioResult
+from hippodrome.sim.scenario import Thresholds
+
+
+def failed_limits(limits: Thresholds, result: ScenarioResult) -> list[str]:
+    """One line per limit that does not hold; a figure that is missing fails its limit."""
+    row = next((row for row in result.rows if row.method == limits.method and not row.quoted), None)
+    if row is None:
+        return [f"no row '{limits.method}'"]
+    if row.failure and (limits.ape_mean_m or limits.rpe_mean_m):
+        return [f"{row.method}: {row.failure}"]
+    localization = row.localization
+    checks: list[tuple[str, float | None, float | None]] = [
+        ("APE mean, m", row.ape.mean_m if row.ape else None, limits.ape_mean_m),
+        ("RPE mean, m", row.rpe.mean_m if row.rpe else None, limits.rpe_mean_m),
+        ("localization error mean, m", localization.error_mean_m if localization else None, limits.localization_error_mean_m),
+        ("false fixes", localization.false_fixes if localization else None, limits.false_fixes),
+    ]
+    failures = [
+        f"{row.method}: {name} is {'missing' if value is None else f'{value:.3g}'}, the limit is {limit:g}"
+        for name, value, limit in checks
+        if limit is not None and (value is None or value > limit)
+    ]
+    return failures + _success(limits, row)
+
+
+def _success(limits: Thresholds, row: Row) -> list[str]:
+    succeeded = row.localization is not None and row.localization.success
+    return [f"{row.method}: never localized"] if limits.localization_success and not succeeded else []

@@ -1,0 +1,21 @@
+"""The mapper without its attractor networks: what they cost is the difference, what they are for is localization."""
+
+from __future__ import annotations
+
+from hippodrome.core.mapping.mapper import Mapper
+from hippodrome.core.mapping.memory import Recognition
+from hippodrome.core.mapping.networks import NeuralPose
+from hippodrome.core.types import Observation
+
+
+class MapperWithoutAttractor(Mapper):
+    """The mapper whose head-direction and grid cells are left out."""
+
+    def _integrate_paths(self, observation: Observation) -> None:
+        pass
+
+    def _reactivate(self, recognitions: list[Recognition]) -> None:
+        pass
+
+    def _reckoned_states(self) -> list[NeuralPose]:
+        return []

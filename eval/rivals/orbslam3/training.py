@@ -1,0 +1,71 @@
+"""Frames of other generated towns, and the vocabulary trained on them, made once and kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from hippodrome.core.types import Frame
+from hippodrome.eval.rivals.orbslam3.vocabulary import (
+    BRANCHING,
+    DEPTH,
+    orb_descriptors,
+    to_text,
+    train,
+)
+from hippodrome.proto.atomic import write_atomically
+from hippodrome.sim.record import RecordingPlan, record
+from hippodrome.sim.render.camera import CameraSpec
+from hippodrome.sim.scenario import DriveSpec, Scenario
+from hippodrome.sim.tour import TourSpec
+from hippodrome.sim.town import TownSpec
+from hippodrome.sim.traffic import TrafficSpec
+
+KINDS: Final[tuple[Literal["grid", "radial", "random", "rural"], ...]] = ("grid", "radial", "random", "rural")
+FIRST_SEED: Final = 770_001  # of the training towns; scenarios use small seeds, and a scenario's own town is left out
+FRAME_RATE_HZ: Final = 1.0  # a frame every 5 to 10 m: neighbours share few corners
+DRIVE_M: Final = 900.0  # about 150 frames a town
+
+
+@dataclass(frozen=True, slots=True)
+class VocabularyTask:
+    """Train for this camera, unless that is on disk already; no town with this seed is looked at."""
+
+    camera: CameraSpec
+    scenario_seed: int
+    root: Path
+
+    @property
+    def path(self) -> Path:
+        size = f"{self.camera.width}x{self.camera.height}-{self.camera.fov_deg:g}deg{'-grain' if self.camera.grain else ''}"
+        return self.root / "vocabulary" / f"orb-k{BRANCHING}-L{DEPTH}-{size}.txt"  # the tracker reads text by the suffix
+
+
+def train_vocabulary(task: VocabularyTask) -> Path:
+    """The vocabulary file."""
+    if not task.path.exists():
+        descriptors, image = orb_descriptors(_training_frames(task))
+        task.path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(task.path, to_text(train(descriptors, image, np.random.default_rng(FIRST_SEED))).encode())
+    return task.path
+
+
+def _training_frames(task: VocabularyTask) -> Iterator[Frame]:
+    camera = task.camera.model_copy(update={"rate_hz": FRAME_RATE_HZ, "stereo_baseline_m": None})
+    for number, kind in enumerate(KINDS):
+        seed = FIRST_SEED + number
+        if seed == task.scenario_seed:
+            continue
+        scenario = Scenario(
+            name=f"words-{kind}",
+            seed=seed,
+            town=TownSpec(kind=kind, width_m=260.0, height_m=260.0, road_km=1.8),
+            camera=camera,
+            mapping=DriveSpec(tour=TourSpec(length_m=DRIVE_M), traffic=TrafficSpec(vehicles=4)),
+        )
+        recording = record(RecordingPlan(scenario, "mapping", task.root / "vocabulary"))
+        yield from (recording.frame(i) for i in range(recording.frame_count))

@@ -1,0 +1,67 @@
+"""Positions and projections on networks known by hand, and against shapely."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from shapely.geometry import LineString, Point
+
+from hippodrome.core.roads.geometry import interpolate, project, road_geometry
+from tests.core.synthetic import grid_network, lanes_of
+
+GRID = grid_network(np.random.default_rng(0))
+GEOMETRY = road_geometry(GRID)
+
+
+def test_positions_on_a_bent_lane():
+    geometry = road_geometry(lanes_of([(0, 0), (10, 0), (10, 5)]))
+    poses = interpolate(geometry, np.zeros(5, dtype=int), np.array([-1.0, 4.0, 12.0, 15.0, 99.0]))
+    half_pi = np.pi / 2
+    assert_allclose(poses, [(0, 0, 0), (4, 0, 0), (10, 2, half_pi), (10, 5, half_pi), (10, 5, half_pi)], atol=1e-12)
+    assert geometry.lane_length_m == pytest.approx([15.0])
+
+
+def test_projection_on_two_lanes_nearest_first():
+    geometry = road_geometry(lanes_of([(0, 0), (100, 0)], [(100, 8), (0, 8)]))
+    found = project(geometry, np.array([[30.0, 3.0], [30.0, 500.0], [-4.0, 0.0]]), 6.0)
+    assert found.start.tolist() == [0, 2, 2, 3]
+    assert found.lane.tolist() == [0, 1, 0]
+    assert found.position_m == pytest.approx([30.0, 70.0, 0.0])
+    assert found.distance_m == pytest.approx([3.0, 5.0, 4.0])
+    assert found.heading_rad == pytest.approx([0.0, np.pi, 0.0])
+    assert_allclose(found.foot_m, [(30, 0), (30, 8), (0, 0)], atol=1e-12)
+
+
+def test_a_very_short_lane_and_coincident_points_are_harmless():
+    geometry = road_geometry(lanes_of([(0, 0), (0.01, 0)], [(0.01, 0), (0.01, 0), (0.01, 9)]))
+    found = project(geometry, np.array([[1.0, 4.0]]), 5.0)
+    assert found.lane.tolist() == [1, 0]
+    assert found.position_m == pytest.approx([4.0, 0.01])
+    assert found.heading_rad == pytest.approx([np.pi / 2, 0.0])
+    pose = interpolate(geometry, np.array([1, 0]), np.array([0.0, 0.005]))
+    assert pose[1] == pytest.approx([0.005, 0.0, 0.0])
+    assert np.isfinite(pose).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(x=st.floats(-50, 650), y=st.floats(-50, 530), radius=st.floats(1.0, 120.0))
+def test_projection_equals_shapely(x, y, radius):
+    found = project(GEOMETRY, np.array([[x, y]]), radius)
+    lines = [LineString(GRID.lane_points_m(lane)) for lane in range(GRID.lane_count)]
+    expected = {lane: line.distance(Point(x, y)) for lane, line in enumerate(lines) if line.distance(Point(x, y)) <= radius}
+    assert dict(zip(found.lane.tolist(), found.distance_m, strict=True)) == pytest.approx(expected, abs=1e-9)
+    assert np.all(np.diff(found.distance_m) >= 0.0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(lane=st.integers(0, GRID.lane_count - 1), share=st.floats(0.0, 1.0))
+def test_a_point_on_a_lane_is_found_there(lane, share):
+    position = share * GEOMETRY.lane_length_m[lane]
+    pose = interpolate(GEOMETRY, np.array([lane]), np.array([position]))
+    expected = LineString(GRID.lane_points_m(lane)).interpolate(position)
+    assert_allclose(pose[0, :2], [expected.x, expected.y], atol=1e-9)
+    found = project(GEOMETRY, pose[:, :2], 1.0)
+    row = found.lane.tolist().index(lane)
+    assert found.distance_m[row] == pytest.approx(0.0, abs=1e-9)
+    assert_allclose(found.foot_m[row], pose[0, :2], atol=1e-9)

@@ -1,0 +1,113 @@
+"""Maps of other makers: read for real by netconvert and libosmium, of bounded size, with the user's file in each error."""
+
+import gzip
+
+import pytest
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.eval.authoring.check import check_scenario
+from hippodrome.eval.authoring.draft import draft_for, new_scenario
+from hippodrome.eval.files.scenarios import read_scenario
+from hippodrome.sim import map_import
+from hippodrome.sim.map_import import import_map
+from hippodrome.sim.sumo_tools import run_tool
+from hippodrome.sim.town import TownSpec, build_town, read_town
+
+CORNERS = [(50.0, 8.0), (50.0, 8.004), (50.002, 8.004), (50.002, 8.0)]
+NODES = "".join(f'<node id="{i}" version="1" lat="{lat}" lon="{lon}"/>' for i, (lat, lon) in enumerate(CORNERS, 1))
+REFS = "".join(f'<nd ref="{i}"/>' for i in (1, 2, 3, 4, 1))
+BLOCK = f"""<?xml version="1.0"?><osm version="0.6">{NODES}
+<way id="1" version="1">{REFS}<tag k="highway" v="residential"/><tag k="maxspeed" v="30"/></way>
+<way id="2" version="1"><nd ref="1"/><nd ref="3"/><tag k="highway" v="footway"/></way></osm>"""
+
+
+def packed_block(folder, ending):
+    """The same block of streets in one of the forms that OpenStreetMap is handed round in."""
+    plain, packed = folder / "block.osm", folder / f"block{ending}"
+    plain.write_text(BLOCK)
+    if ending == ".osm.gz":
+        packed.write_bytes(gzip.compress(plain.read_bytes()))
+    elif ending in (".osm.pbf", ".osm.bz2"):
+        osmium = pytest.importorskip("osmium")
+        with osmium.SimpleWriter(str(packed)) as writer:
+            for one in osmium.FileProcessor(str(plain)):
+                writer.add(one)
+    return packed
+
+
+@pytest.mark.parametrize("ending", [".osm", ".osm.gz", ".osm.pbf", ".osm.bz2"])
+def test_new_reads_openstreetmap_in_every_form(tmp_path, ending):
+    path = tmp_path / "scenarios" / "block.yaml"
+    path.parent.mkdir()
+    draft = new_scenario("block", str(packed_block(tmp_path, ending)), path)
+    assert 0.9 < draft.drivable_km < 1.1  # round a block of about 290 m by 220 m in one direction, for nobody turns round
+    assert check_scenario(path).errors == ()
+    assert {one.name for one in path.parent.iterdir()} == {"block.yaml", "block.net.xml.gz"}
+    assert read_scenario(path).town.network == path.parent / "block.net.xml.gz"
+
+
+def test_new_reads_opendrive(tmp_path):
+    """A generated town written as OpenDRIVE by netconvert, and read again, is as long as it was."""
+    town = build_town(TownSpec(kind="grid", width_m=190, height_m=190, road_km=1.3), 1, tmp_path)
+    source = tmp_path / "town.xodr"
+    run_tool("netconvert", f"--sumo-net-file={town.net_file}", f"--opendrive-output={source}", "--no-warnings=true")
+    draft = new_scenario("again", str(source), tmp_path / "again.yaml")
+    assert draft.drivable_km == pytest.approx(draft_for(town).drivable_km, rel=0.05)
+    assert check_scenario(tmp_path / "again.yaml").errors == ()
+
+
+def test_the_same_map_gives_the_same_bytes(tmp_path):
+    source = packed_block(tmp_path, ".osm")
+    made = [tmp_path / name for name in ("one.net.xml.gz", "two.net.xml.gz")]
+    for net_file in made:
+        import_map(source, net_file)
+    assert made[0].read_bytes() == made[1].read_bytes()
+    assert b"<!--" not in gzip.decompress(made[0].read_bytes()) and read_town(made[0]).network.lane_count > 0
+
+
+def test_a_bomb_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(map_import, "MAX_UNPACKED_BYTES", 1 << 20)
+    source = tmp_path / "bomb.osm.gz"
+    source.write_bytes(gzip.compress(bytes(3 << 20)))
+    country = tmp_path / "country.osm.pbf"
+    country.write_bytes(bytes(2 << 20))
+    with pytest.raises(HippodromeError, match=r"country\.osm\.pbf: more than 1 MiB"):
+        import_map(country, tmp_path / "out.net.xml.gz")
+    with pytest.raises(HippodromeError, match=r"bomb\.osm\.gz: more than 1 MiB; cut out a smaller area"):
+        import_map(source, tmp_path / "out.net.xml.gz")
+
+
+@pytest.mark.parametrize(("name", "content", "reason"), [
+    ("a.osm", b"hello", "cannot be imported"),
+    ("a.osm", b"<osm/>", "cannot be imported|no roads|no lane|not a"),
+    ("a.osm.gz", b"hello", "cannot be read"),
+    ("a.osm.pbf", b"hello", "cannot be read"),
+    ("a.xodr", b"<osm/>", "cannot be imported|no lane|no roads"),
+    ("a.net.xml", b"hello", "not a SUMO network"),
+    ("a.kml", b"hello", "unknown kind of map; there are .net.xml"),
+    ("lost.osm", None, "no such file"),
+])  # fmt: skip
+def test_what_cannot_be_read_is_said_of_the_users_file(tmp_path, name, content, reason):
+    if name.endswith(".pbf"):
+        pytest.importorskip("osmium")
+    source = tmp_path / name
+    if content is not None:
+        source.write_bytes(content)
+    with pytest.raises(HippodromeError, match=reason) as refused:
+        new_scenario("a", str(source), tmp_path / "out.yaml")
+    assert str(source) in str(refused.value)
+    assert [one.name for one in tmp_path.iterdir() if one != source] == []
+
+
+def test_without_osmium_the_cure_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "osmium", None)
+    with pytest.raises(HippodromeError, match=r"pip install 'hippodrome\[osm\]'"):
+        import_map(packed_block(tmp_path, ".osm").rename(tmp_path / "a.osm.pbf"), tmp_path / "out.net.xml.gz")
+
+
+def test_new_overwrites_no_network(tmp_path):
+    source = packed_block(tmp_path, ".osm")
+    (tmp_path / "b.net.xml.gz").write_text("mine")
+    with pytest.raises(HippodromeError, match=r"b\.net\.xml\.gz: exists already"):
+        new_scenario("b", str(source), tmp_path / "b.yaml")
+    assert not (tmp_path / "b.yaml").exists()

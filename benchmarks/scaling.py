@@ -25,7 +25,7 @@ import matplotlib as mpl
 import numpy as np
 
 from benchmarks.table import Row, table
-from hippodrome.core.refinement import route as refine_default
+from hippodrome.core.refinement import route
 from hippodrome.core.types import StartPose
 from tests.core.synthetic import SyntheticDrive, grid_network, semi_metric_drive
 
@@ -76,7 +76,7 @@ def _drive(network: Any, vertices: int) -> SyntheticDrive:
 
 def _refine(network: Any, drive: SyntheticDrive) -> Any:
     start = StartPose(*(float(value) for value in drive.true_poses[0]))
-    return refine_default.refine_default(drive.cognitive_map, network, refine_default.DefaultRefineConfig(), start)
+    return route.refine_route(drive.cognitive_map, network, route.RouteRefineConfig(), start)
 
 
 @contextmanager
@@ -95,7 +95,7 @@ def _stopwatches(spent: dict[str, float]) -> Iterator[None]:
 
     with ExitStack() as stack:
         for attribute, name in STAGES.items():
-            stack.enter_context(patch.object(refine_default, attribute, timed(name, getattr(refine_default, attribute))))
+            stack.enter_context(patch.object(route, attribute, timed(name, getattr(route, attribute))))
         yield
 
 

@@ -54,7 +54,8 @@ from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import Scenario
 
 DEAD_RECKONING, SEMI_METRIC = "dead reckoning", "semi-metric"
-MODES: tuple[tuple[str, Literal["paper", "default"]], ...] = (("topometric (paper)", "paper"), ("topometric", "default"))
+MAP_FILES = {"paper": "topometric-paper.pbstream", "route": "topometric-default.pbstream"}  # read by name since 0.1
+MODES: tuple[tuple[str, Literal["paper", "route"]], ...] = (("topometric (paper)", "paper"), ("topometric", "route"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,13 +114,13 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
     return _result(materials, rows, mapping_s, found)
 
 
-def _topometric(method: str, mode: Literal["paper", "default"], semi_metric: CognitiveMap, materials: Materials) -> Topometric:
+def _topometric(method: str, mode: Literal["paper", "route"], semi_metric: CognitiveMap, materials: Materials) -> Topometric:
     """One refinement mode, and localization in its map. Mode ``paper`` is told where the drive began, as the paper's was."""
     scenario, truth = materials.scenario, materials.mapping.ground_truth()
     start = StartPose(*(float(value) for value in truth.poses[0])) if mode == "paper" else None
     refinement, cpu_s = refine_map(semi_metric, materials.roads, refine_config(scenario, mode), start)
     refined = refinement.cognitive_map
-    map_bytes = save_map(materials.folder / f"topometric-{mode}.pbstream", refined, _provenance(materials, method))
+    map_bytes = save_map(materials.folder / MAP_FILES[mode], refined, _provenance(materials, method))
     localization = localize_recording(materials.drive.observations(), refined, materials.roads, scenario.localizer)
     return Topometric(
         refinement=refinement,

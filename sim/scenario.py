@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
@@ -12,6 +12,7 @@ from hippodrome.core.mapping.mapper import MapperConfig
 from hippodrome.core.refinement.refine import RefineConfig
 from hippodrome.sim.ego import EgoSpec
 from hippodrome.sim.episode import camera_divider
+from hippodrome.sim.renamed import with_present_names
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scene.conditions import Conditions
 from hippodrome.sim.self_motion import NoiseLevel, SelfMotionNoise, noise_of
@@ -58,6 +59,11 @@ class Scenario(Spec):
     refine: RefineConfig = RefineConfig()
     localizer: LocalizerConfig = LocalizerConfig()
     thresholds: Thresholds = Thresholds()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _old_names(cls, data: Any) -> Any:
+        return with_present_names(data)
 
     @model_validator(mode="after")
     def _rates_fit(self) -> Scenario:

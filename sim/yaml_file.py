@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from hippodrome.core.types import HippodromeError
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
+UNKNOWN_KEY = {"extra_forbidden", "unexpected_keyword_argument"}  # pydantic's names, of models and of dataclasses
 MAX_BYTES = 1 << 20  # a scenario is a page; more is a mistake or an attack
 
 
@@ -56,7 +57,7 @@ def _read(path: Path) -> str:
 
 
 def _reason(kind: str, message: str) -> str:
-    return "unknown key; see the scenario reference in docs/scenarios.md" if kind == "extra_forbidden" else message
+    return "unknown key; see the scenario reference in docs/scenarios.md" if kind in UNKNOWN_KEY else message
 
 
 def _line(node: yaml.Node | None, location: Sequence[int | str]) -> int:

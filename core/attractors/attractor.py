@@ -3,7 +3,7 @@
 A belief is (mean, reliability); reliability is Fisher information, 1/sigma^2 in 1/rad^2. Every equation is one function on
 floats or arrays. ``core.head_direction`` (ring) and ``core.grid_cells`` (tori) are built from them.
 
-Where the printed equations fail, mode "default" departs from them, and says so at the function; mode "paper" keeps them as
+Where the printed equations fail, mode "bounded" departs from them, and says so at the function; mode "paper" keeps them as
 printed, with a floor under the reliabilities, in the order path integration, mutual inhibition, global inhibition.
 """
 
@@ -26,11 +26,11 @@ UNINFORMED = 1e-2  # share of the total information below which a network counts
 
 @dataclass(frozen=True)
 class AttractorConfig:
-    """One network's constants. Inhibition strengths act per update in mode "paper", per second in mode "default"."""
+    """One network's constants. Inhibition strengths act per update in mode "paper", per second in mode "bounded"."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    mode: Literal["paper", "default"] = "default"
+    mode: Literal["paper", "bounded"] = "bounded"
     information: float = 100.0  # E, 1/rad^2: the published family uses 100 for head direction
     calibration_share: float = 0.1  # of the information that the calibration cells hold at the start and after a hand-back
     inhibition_integrator: float = 0.02  # Delta_inte of Eq. (6); an unconfirmed challenger fades within some ten seconds
@@ -120,7 +120,7 @@ def overlap(mu_inte: Real, r_inte: Real, mu_cali: Real, r_cali: Real) -> Real:
 def forget(
     mu_inte: Real, r_inte: Real, mu_cali: Real, r_cali: Real, sq_sigma_inte: Real, sq_sigma_cali: Real
 ) -> tuple[Real, Real]:
-    """Reliabilities after motion noise of variances ``sq_sigma_*``, as path integration adds it (mode "default" only).
+    """Reliabilities after motion noise of variances ``sq_sigma_*``, as path integration adds it (mode "bounded" only).
 
     Populations that agree share one belief and fade together, their sum as 1/(1/W + sq_sigma); in conflict each fades alone.
     """
@@ -155,7 +155,7 @@ def inhibit(
 ) -> FloatArray:
     """One update of the competition; arrays (M modules, 2 populations, A axes), returns the new reliabilities.
 
-    Mode "default": strengths per second instead of per update, so that the outcome does not depend on the tick rate; weighted
+    Mode "bounded": strengths per second instead of per update, so that the outcome does not depend on the tick rate; weighted
     by the conflict (1 - overlap), as peaks that coincide have nothing to settle; skipped while the network is uninformed.
     """
     scale = 1.0 if config.mode == "paper" else dt_s

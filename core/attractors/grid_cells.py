@@ -122,7 +122,7 @@ def stimulate(state: GridState, position: FloatArray, reliability: FloatArray) -
 
 
 def inject(state: GridState, position: FloatArray, reliability: FloatArray, config: AttractorConfig) -> GridState:
-    """One injection: Eqs. (13)-(14), Li et al. 2025; mode "default" then hands the fused belief back to both populations."""
+    """One injection: Eqs. (13)-(14), Li et al. 2025; mode "bounded" then hands the fused belief back to both populations."""
     stimulated = stimulate(state, position, reliability)
     return stimulated if config.mode == "paper" else hand_back(stimulated, config)
 

@@ -56,7 +56,7 @@ def stimulate(state: HeadDirectionState, heading_rad: float, reliability: float)
 
 
 def inject(state: HeadDirectionState, heading_rad: float, reliability: float, config: AttractorConfig) -> HeadDirectionState:
-    """One injection: Eqs. (13)-(14), Li et al. 2025; mode "default" then hands the fused belief back to both populations."""
+    """One injection: Eqs. (13)-(14), Li et al. 2025; mode "bounded" then hands the fused belief back to both populations."""
     stimulated = stimulate(state, heading_rad, reliability)
     return stimulated if config.mode == "paper" else hand_back(stimulated, config)
 

@@ -14,7 +14,7 @@ from hippodrome.core.views.keyframes import ViewStepConfig
 from hippodrome.core.views.odometry import CameraGeometry
 from hippodrome.core.views.sequence import SequenceConfig
 
-Mode: TypeAlias = Literal["default", "paper", "kalman", "lanes"]
+Mode: TypeAlias = Literal["coupled", "paper", "kalman", "lanes"]
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,15 @@ class PaperNetworks:
 
 @dataclass(frozen=True)
 class LocalizerConfig:
-    """Mode "default": attractors with hand-back; "paper": as printed. Yardsticks, given the same injections: "kalman", a Kalman
-    filter, and "lanes", a Bayes filter on the lanes of the network.
+    """The localizer's modes and constants.
+
+    Mode "coupled": attractor networks that know how their errors hang together. Mode "paper": the networks as printed.
+    Yardsticks, given the same injections: "kalman", an extended Kalman filter, and "lanes", a Bayes filter on the lanes.
     """
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
-    mode: Mode = "default"
+    mode: Mode = "coupled"
     self_motion: Literal["wheel", "visual"] = "wheel"  # visual: from the frames alone, the observations' own is not looked at
     camera: CameraGeometry = field(default_factory=CameraGeometry)  # for self_motion "visual"
     views: ViewCellConfig = field(default_factory=ViewCellConfig)

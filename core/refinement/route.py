@@ -1,4 +1,4 @@
-"""RC-HMM beyond the paper (mode ``default``): route search on raw motions, then refinement to decimetres.
+"""RC-HMM beyond the paper (mode ``route``): route search on raw motions, then refinement to decimetres.
 
 Start and scale are unknown. The vertices hang on the line of the matched route (point to line, robust), on raw odometry with
 a drifting scale and a gyro whose gain and bias are estimated, and on the loop closures that agree with it.
@@ -38,8 +38,8 @@ from hippodrome.core.types import (
 
 
 @dataclass(frozen=True, slots=True)
-class DefaultRefineConfig:
-    """Mode ``default``."""
+class RouteRefineConfig:
+    """Mode ``route``."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
@@ -48,8 +48,8 @@ class DefaultRefineConfig:
     solver: SolverConfig = field(default_factory=SolverConfig)
 
 
-def refine_default(
-    cognitive_map: CognitiveMap, network: RoadNetwork, config: DefaultRefineConfig, start: StartPose | None = None
+def refine_route(
+    cognitive_map: CognitiveMap, network: RoadNetwork, config: RouteRefineConfig, start: StartPose | None = None
 ) -> Refinement:
     """The topometric map, from an unknown start unless one is given."""
     visits, edges = cognitive_map.visits, closure_edges(cognitive_map)

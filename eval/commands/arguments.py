@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 
 from hippodrome.core.types import StartPose
+from hippodrome.sim.renamed import present_value
 
 DONE, THRESHOLD_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -54,3 +55,13 @@ def start_pose(text: str) -> StartPose:
     except ValueError:
         raise argparse.ArgumentTypeError(f"'{text}' is not X,Y,HEADING (metres, metres, degrees)") from None
     return StartPose(x_m, y_m, math.radians(heading_deg))
+
+
+def refine_mode(text: str) -> str:
+    """A mode of the refinement, also by an old name."""
+    return str(present_value("refine.mode", text))
+
+
+def localizer_mode(text: str) -> str:
+    """A mode of the localizer, also by an old name."""
+    return str(present_value("localizer.mode", text))

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, start_pose
+from hippodrome.eval.commands.arguments import DONE, refine_mode, start_pose
 
 
 def add_stage_commands(commands: Any) -> None:
@@ -21,7 +21,7 @@ def add_stage_commands(commands: Any) -> None:
     refine.add_argument("map", type=Path, metavar="MAP.pbstream")
     refine.add_argument("--network", type=Path, required=True, metavar="NET.net.xml[.gz]")
     refine.add_argument(
-        "--mode", choices=["default", "paper"], default="default", help="default: unknown start; paper: Eqs. (8)-(12)"
+        "--mode", type=refine_mode, choices=["route", "paper"], default="route", help="route: unknown start; paper: Eqs. (8)-(12)"
     )
     refine.add_argument(
         "--start", type=start_pose, metavar="X,Y,HEADING", help="known start: metres, degrees (mode paper needs it)"

@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, add_out, add_workers, positive, seed
+from hippodrome.eval.commands.arguments import DONE, add_out, add_workers, localizer_mode, positive, seed
 
-MODES = ("default", "kalman", "lanes", "paper")  # of the localizer, see core.localizer_config.Mode
+MODES = ("coupled", "kalman", "lanes", "paper")  # of the localizer, see core.localizer_config.Mode
 
 
 def add_trial_commands(commands: Any) -> None:
@@ -29,7 +29,13 @@ def add_trial_commands(commands: Any) -> None:
     robust.add_argument("--sequences", type=positive, default=8, metavar="N", help="unknown starts per condition (default: 8)")
     robust.add_argument("--start", type=positive, metavar="N", help="only this start of each condition: a failure, run again")
     robust.add_argument(
-        "--modes", nargs="+", choices=MODES, default=list(MODES), metavar="MODE", help=f"of {', '.join(MODES)} (default: all)"
+        "--modes",
+        nargs="+",
+        type=localizer_mode,
+        choices=MODES,
+        default=list(MODES),
+        metavar="MODE",
+        help=f"of {', '.join(MODES)} (default: all)",
     )
     add_workers(robust)
     add_out(robust, "out/robustness")
@@ -68,7 +74,7 @@ def _robustness(options: argparse.Namespace) -> int:
     """Map each town once, then localize from several unknown starts under each of many conditions; tables and a heat map."""
     from hippodrome.eval.trials.robustness.run import Request, robustness
 
-    modes = list(dict.fromkeys(["default", *options.modes]))
+    modes = list(dict.fromkeys(["coupled", *options.modes]))
     robustness(
         Request(options.scenarios, options.conditions, options.sequences, options.start, modes, options.workers, options.out)
     )

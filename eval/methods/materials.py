@@ -51,7 +51,7 @@ def gather(scenario: Scenario, out: Path) -> Materials:
     return Materials(scenario, folder, town, roads, finish(mapping), finish(drive))
 
 
-def refine_config(scenario: Scenario, mode: Literal["default", "paper"], survey_error_m: float | None = None) -> RefineConfig:
+def refine_config(scenario: Scenario, mode: Literal["route", "paper"], survey_error_m: float | None = None) -> RefineConfig:
     """The scenario's refinement in one mode, told how accurate the road network is: surveyors state that, no drive can show it.
 
     ``survey_error_m``: of the network that is given, where it is not the scenario's own. A value set in the scenario stands.
@@ -59,9 +59,9 @@ def refine_config(scenario: Scenario, mode: Literal["default", "paper"], survey_
     config = scenario.refine
     if survey_error_m is None:
         survey_error_m = scenario.self_motion_noise.survey_error_m
-    solver = config.default.solver
+    solver = config.route.solver
     stated = replace(solver, survey_sigma_m=solver.survey_sigma_m or survey_error_m)
-    return replace(config, mode=mode, default=replace(config.default, solver=stated))
+    return replace(config, mode=mode, route=replace(config.route, solver=stated))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -114,11 +114,11 @@ def map_files(recording: Path, scenario: Path | None, out: Path) -> None:
 
 
 def refine_files(
-    source: Path, network: Path, mode: Literal["default", "paper"], start: StartPose | None, scenario: Path | None, out: Path
+    source: Path, network: Path, mode: Literal["route", "paper"], start: StartPose | None, scenario: Path | None, out: Path
 ) -> None:
     """``hippodrome refine``."""
     if mode == "paper" and start is None:
-        raise HippodromeError("mode 'paper' begins at a known pose: give --start X,Y,HEADING, or use --mode default")
+        raise HippodromeError("mode 'paper' begins at a known pose: give --start X,Y,HEADING, or use --mode route")
     cognitive_map, provenance = load_map(source)
     config = replace(_settings(scenario).refine, mode=mode)
     refinement, cpu_s = refine_map(cognitive_map, read_network(located(network, "--network")), config, start)

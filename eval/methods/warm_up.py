@@ -45,7 +45,7 @@ def warm_up() -> None:
             yield Observation(float(t_s), motion.dt_s, float(speed), float(yaw_rate), frame)
 
     cognitive_map, _ = map_recording(observations(), MapperConfig())
-    for mode in ("default", "paper"):
+    for mode in ("route", "paper"):
         try:
             refinement, _ = refine_map(cognitive_map, town.network, RefineConfig(mode=mode), start)
         except HippodromeError:

@@ -210,9 +210,9 @@ def _command_lines(scenario: ScenarioResult, evidence: MapEvidence | None) -> It
     for row in scenario.rows:
         if not row.method.startswith("topometric"):
             continue
-        mode = "paper" if row.method.endswith("(paper)") else "default"
+        mode = "paper" if row.method.endswith("(paper)") else "route"
         start = ["--start=" + ",".join(f"{value:.6f}" for value in evidence.start)] if mode == "paper" else []
-        refined = f"topometric-{mode}.pbstream"
+        refined = f"topometric-{'paper' if mode == 'paper' else 'default'}.pbstream"
         yield (
             row.method,
             shlex.join(

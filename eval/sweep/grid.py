@@ -17,6 +17,7 @@ from pydantic import ValidationError
 import hippodrome.core.types
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.sweep.executors import SweepError
+from hippodrome.sim.renamed import present_key
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS
 
@@ -94,7 +95,7 @@ def make_grid(paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Se
 def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
     """The scenario with one key replaced, checked as if it stood in the file."""
     values = scenario.model_dump()
-    *parents, last = key.split(".")
+    *parents, last = present_key(key).split(".")
     place: Any = values
     for part in parents:
         if part == "noise" and isinstance(place[part], str):  # a level's name stands for its values

@@ -91,7 +91,7 @@ class ConditionResult:
 
     name: str
     sequences: tuple[SequenceResult, ...]
-    mode: Mode = "default"
+    mode: Mode = "coupled"
 
     @property
     def failures(self) -> list[SequenceResult]:
@@ -133,7 +133,7 @@ def pooled(sequences: Sequence[SequenceResult]) -> dict[str, Any]:
 class Findings:
     """All that one run of the command found."""
 
-    results: Sequence[ConditionResult]  # by mode, then by condition; last, the default in another town
+    results: Sequence[ConditionResult]  # by mode, then by condition; last, the coupled attractors in another town
     places: Sequence[PlaceResult]
     kidnapped: dict[str, tuple[Kidnapping, ...]]  # by condition
     paper: tuple[PaperSequence, ...]
@@ -146,8 +146,8 @@ class Findings:
 
     @property
     def conditions(self) -> list[ConditionResult]:
-        """The default mode's, in the mapped town."""
-        return [result for result in self.results if result.mode == "default" and result.name != ELSEWHERE]
+        """Those of mode ``coupled``, in the mapped town."""
+        return [result for result in self.results if result.mode == "coupled" and result.name != ELSEWHERE]
 
     def summary(self) -> dict[str, Any]:
         """Every figure as plain data."""
@@ -165,7 +165,7 @@ class Findings:
     def targets(self) -> list[Target]:
         """Against what they must be. A declaration in another town is a false fix too."""
         data = self.summary()
-        everywhere = [result.summary() for result in self.results if result.mode == "default"]
+        everywhere = [result.summary() for result in self.results if result.mode == "coupled"]
         mapped = pooled([one for result in self.conditions for one in result.sequences])
         measured = {**data["timings"], "bytes_per_view": self.bytes_per_view}
         return targets(mapped, everywhere, data["places"], data["paper_lengths"], data["kidnapping_all"], measured)
@@ -242,8 +242,8 @@ def _cells(row: dict[str, Any]) -> list[str]:
 
 
 def _failures(results: Sequence[ConditionResult]) -> str:
-    """What to run again: every failed sequence of the default mode."""
-    failed = [(result, one) for result in results if result.mode == "default" for one in result.failures]
+    """What to run again: every failed sequence of mode ``coupled``."""
+    failed = [(result, one) for result in results if result.mode == "coupled" for one in result.failures]
     lines = [
         f"- {result.name}, start {one.number}: "
         + (f"{one.false_fixes} false fixes" if one.false_fixes else f"not localized within {WITHIN_M:g} m")

@@ -58,7 +58,7 @@ class Task:
     mapped: Scenario
     out: Path
     starts: tuple[int, int | None]  # how many unknown starts, and the one that is wanted alone
-    mode: Mode = "default"
+    mode: Mode = "coupled"
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +126,7 @@ def _build_map(task: tuple[Scenario, Path]) -> None:
     scenario, out = task
     recording = finish(RecordingPlan(scenario, "mapping", out))
     semi_metric, _ = map_recording(recording.observations(), scenario.mapper)
-    refined, _ = refine_map(semi_metric, _roads(scenario, out), refine_config(scenario, "default"), None)
+    refined, _ = refine_map(semi_metric, _roads(scenario, out), refine_config(scenario, "route"), None)
     save_map(map_path(scenario, out), refined.cognitive_map, {"scenario": scenario.name, "recording": recording.folder.name})
 
 

@@ -145,7 +145,7 @@ def _run_case(case: StressCase, task: StressTask, maps: dict[str, CognitiveMap])
     row = StressRow(scenario.name, scenario.seed, case.name, len(semi_metric.t_s), rerun=task.rerun(case))
     began = process_time()
     try:
-        refined = refine(semi_metric, roads, refine_config(scenario, "default", survey_error_m), start).cognitive_map
+        refined = refine(semi_metric, roads, refine_config(scenario, "route", survey_error_m), start).cognitive_map
     except HippodromeError as error:
         return replace(row, failure=str(error), cpu_s=process_time() - began)
     row = _scored(row, refined, recording, process_time() - began)

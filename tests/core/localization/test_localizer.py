@@ -20,7 +20,7 @@ PICTURES = Pictures(seed=3)
 MAP = topometric_map(PICTURES, np.random.default_rng(3))
 
 
-def run(mode="default", cognitive_map=MAP, seed=11, length_m=700.0, metres_per_unit=2.5, **driving):
+def run(mode="coupled", cognitive_map=MAP, seed=11, length_m=700.0, metres_per_unit=2.5, **driving):
     observations, truth = drive(
         PICTURES, np.random.default_rng(seed), 137.0, length_m, metres_per_unit=metres_per_unit, **driving
     )
@@ -150,7 +150,7 @@ def test_a_place_that_is_not_what_is_seen_is_doubted():
 
 @pytest.mark.parametrize("pose_type", [AttractorPose, KalmanPose])
 def test_an_outlier_in_the_same_place_neither_unseats_nor_drags_the_incumbent(pose_type):
-    localizer = Localizer(MAP, None, LocalizerConfig(mode="default" if pose_type is AttractorPose else "kalman"))
+    localizer = Localizer(MAP, None, LocalizerConfig(mode="coupled" if pose_type is AttractorPose else "kalman"))
     observations, truth = drive(PICTURES, np.random.default_rng(5), 137.0, 100.0)
     for observation in observations:
         before = localizer.step(observation)

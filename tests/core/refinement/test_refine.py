@@ -18,11 +18,11 @@ def test_both_modes_answer_and_the_default_is_closer(world):
     network, drive = world
     start = StartPose(*drive.true_poses[0])
     ape = {}
-    for mode in ("default", "paper"):
+    for mode in ("route", "paper"):
         refined = refine(drive.cognitive_map, network, RefineConfig(mode=mode), start).cognitive_map
         assert refined.frame == "network"
         ape[mode] = np.hypot(*(refined.poses - drive.true_poses)[:, :2].T).mean()
-    assert ape["default"] < ape["paper"]
+    assert ape["route"] < ape["paper"]
 
 
 def test_mode_paper_asks_for_a_start(world):

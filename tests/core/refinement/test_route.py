@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hippodrome.core.refinement.route import DefaultRefineConfig, refine_default
+from hippodrome.core.refinement.route import RouteRefineConfig, refine_route
 from hippodrome.core.se2 import compose, wrap
 from hippodrome.core.types import EdgeKind, MatchStatus, Visits
 from tests.core.synthetic import grid_network, semi_metric_drive
 
-CONFIG = DefaultRefineConfig()
+CONFIG = RouteRefineConfig()
 LENGTH_M = 2500.0
 
 
@@ -42,7 +42,7 @@ def driven(network):
 
 @pytest.fixture(scope="module")
 def refined(network, driven):
-    return refine_default(driven.cognitive_map, network, CONFIG)
+    return refine_route(driven.cognitive_map, network, CONFIG)
 
 
 def test_decimetres_from_an_unknown_start(refined, driven):
@@ -66,7 +66,7 @@ def test_the_covariance_is_calibrated(network):
     nees = []
     for seed in range(3):
         there = drive(network, seed)
-        found = refine_default(there.cognitive_map, network, CONFIG)
+        found = refine_route(there.cognitive_map, network, CONFIG)
         off = errors(found, there.true_poses)
         nees.append(np.einsum("ni,nij,nj->n", off, np.linalg.inv(found.cognitive_map.covariance), off).mean() / 3.0)
     assert 0.5 < np.mean(nees) < 2.0
@@ -75,9 +75,9 @@ def test_the_covariance_is_calibrated(network):
 def test_false_closures_do_not_matter(network, driven):
     poisoned = drive(network, false_share=0.2)
     np.testing.assert_allclose(poisoned.true_poses, driven.true_poses)
-    found = refine_default(poisoned.cognitive_map, network, CONFIG)
+    found = refine_route(poisoned.cognitive_map, network, CONFIG)
     without = replace(poisoned.cognitive_map, edges=_without_closures(poisoned.cognitive_map.edges))
-    assert ape(found, driven.true_poses) < 1.3 * ape(refine_default(without, network, CONFIG), driven.true_poses)
+    assert ape(found, driven.true_poses) < 1.3 * ape(refine_route(without, network, CONFIG), driven.true_poses)
 
 
 def _without_closures(edges):
@@ -90,7 +90,7 @@ def _without_closures(edges):
 def test_the_gyros_gain_is_estimated(network, driven):
     motion = driven.cognitive_map.visits.motion * [1.0, 1.0, 1.0 / 1.04]
     skewed = replace(driven.cognitive_map, visits=replace(driven.cognitive_map.visits, motion=motion))
-    found = refine_default(skewed, network, CONFIG)
+    found = refine_route(skewed, network, CONFIG)
     assert found.estimates["gyro_gain_error"] == pytest.approx(0.04, abs=0.01)
     assert ape(found, driven.true_poses) < 0.5
 
@@ -99,7 +99,7 @@ def test_a_missing_road_is_off_network_and_the_rest_is_right(network, driven):
     before = driven.true_lane[: len(driven.true_lane) // 2]
     gone = int(np.bincount(before[~network.is_internal[before]]).argmax())
     twin = gone ^ 1  # the other direction of the same road
-    found = refine_default(driven.cognitive_map, _without_lanes(network, {gone, twin}), CONFIG)
+    found = refine_route(driven.cognitive_map, _without_lanes(network, {gone, twin}), CONFIG)
     status = found.cognitive_map.road_match.status
     off_road = np.isin(driven.true_lane, [gone, twin])
     wrong = np.hypot(*errors(found, driven.true_poses)[:, :2].T)
@@ -145,7 +145,7 @@ def test_merged_vertices_keep_their_first_visit(network, driven):
         if np.hypot(*motion[:2]) < 2.0 and np.hypot(*(driven.true_poses[a] - driven.true_poses[b])[:2]) < 5.0:
             vertex[a] = vertex[b]
     merged = replace(plain, visits=replace(plain.visits, vertex=vertex), edges=_without_closures(plain.edges))
-    found = refine_default(merged, network, CONFIG)
+    found = refine_route(merged, network, CONFIG)
     used = np.unique(vertex)
     assert len(used) < len(vertex)
     assert np.hypot(*errors(found, driven.true_poses)[used, :2].T).mean() < 0.6
@@ -163,17 +163,17 @@ def test_a_stop_with_a_noisy_gyro_is_survived(network, driven):
         vertex=np.concatenate([visits.vertex[:middle], np.full(still, middle - 1), visits.vertex[middle:]]).astype(np.int32),
         motion=np.concatenate([visits.motion[:middle], pause, visits.motion[middle:]]),
     )
-    found = refine_default(replace(driven.cognitive_map, visits=grown), network, CONFIG)
+    found = refine_route(replace(driven.cognitive_map, visits=grown), network, CONFIG)
     assert ape(found, driven.true_poses) < 0.5
 
 
 def test_the_answer_is_the_same_every_time(network, driven, refined):
-    again = refine_default(driven.cognitive_map, network, CONFIG)
+    again = refine_route(driven.cognitive_map, network, CONFIG)
     assert again.cognitive_map.poses.tobytes() == refined.cognitive_map.poses.tobytes()
     assert again.estimates == refined.estimates
 
 
 def test_the_first_pose_of_the_map_does_not_matter(network, driven, refined):
     moved = replace(driven.cognitive_map, poses=compose(np.array([5.0, 6.0, 1.0]), driven.cognitive_map.poses))
-    found = refine_default(moved, network, CONFIG)
+    found = refine_route(moved, network, CONFIG)
     assert found.cognitive_map.poses.tobytes() == refined.cognitive_map.poses.tobytes()

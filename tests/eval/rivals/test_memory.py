@@ -46,4 +46,4 @@ def test_each_method_has_a_job_of_its_own():
     assert jobs["semi-metric"].refine is None
     assert jobs["topometric (paper)"].refine[1].mode == "paper"
     assert jobs["topometric (paper)"].refine[2].x_m == 1.0
-    assert (jobs["topometric"].refine[1].mode, jobs["topometric"].refine[2]) == ("default", None)
+    assert (jobs["topometric"].refine[1].mode, jobs["topometric"].refine[2]) == ("route", None)

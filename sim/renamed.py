@@ -1,0 +1,53 @@
+"""Keys and values of scenarios that have been renamed: files and commands that use the old names go on working."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Final
+
+NETWORKS: Final = ("mapper.attractor.head", "mapper.attractor.grid", "localizer.head", "localizer.grid")
+KEYS: Final = {"refine.default": "refine.route"}  # old: new, dotted as in docs/scenarios.md
+VALUES: Final[dict[str, dict[str, str]]] = {  # by the key's new name
+    "refine.mode": {"default": "route"},
+    "localizer.mode": {"default": "coupled"},
+    **{f"{network}.mode": {"default": "bounded"} for network in NETWORKS},
+}
+
+
+def present_key(key: str) -> str:
+    """A dotted key by its present name."""
+    for old, new in KEYS.items():
+        if key == old or key.startswith(f"{old}."):
+            return new + key.removeprefix(old)
+    return key
+
+
+def present_value(key: str, value: Any) -> Any:
+    """A value of ``key`` (its present name) by the value's present name."""
+    return VALUES.get(key, {}).get(value, value) if isinstance(value, str) else value
+
+
+def with_present_names(scenario: Any) -> Any:
+    """A scenario as plain data, old names replaced; where the old and the new name of a key stand side by side, both stay."""
+    for old, new in KEYS.items():
+        (*parents, last), present = old.split("."), new.rpartition(".")[2]
+        scenario = _changed(scenario, parents, partial(_renamed, last, present))
+    for key in VALUES:
+        scenario = _changed(scenario, key.split("."), partial(present_value, key))
+    return scenario
+
+
+def _changed(data: Any, path: Sequence[str], change: Callable[[Any], Any]) -> Any:
+    """A copy of ``data`` in which ``change`` was made at ``path``; ``data`` itself where there is no such place."""
+    if not path:
+        return change(data)
+    if not isinstance(data, dict) or path[0] not in data:
+        return data
+    return {**data, path[0]: _changed(data[path[0]], path[1:], change)}
+
+
+def _renamed(old: str, new: str, data: Any) -> Any:
+    if not isinstance(data, dict) or new in data:
+        return data
+    return {new if name == old else name: value for name, value in data.items()}

@@ -1,16 +1,42 @@
-"""SE(2) poses as arrays ``(..., 3)`` of (x, y, heading_rad); all functions broadcast and return new arrays."""
+"""SE(2) poses as arrays ``(..., 3)`` of (x, y, heading_rad); all functions broadcast and return new arrays.
+
+Angles are wrapped in three ways, each the fastest for its callers: ``wrap`` for arrays in Python, ``wrap_compiled`` for compiled
+code and for single numbers, ``wrap_near_zero`` for compiled inner loops whose angles lie within a few turns of zero.
+"""
 
 from __future__ import annotations
 
+import math
+from typing import Any, TypeAlias
+
 import numpy as np
+from numba import njit
 
 from hippodrome.core.types import FloatArray
+
+Real: TypeAlias = Any  # a float or a FloatArray: numba compiles each case
 
 
 def wrap(angle_rad: FloatArray) -> FloatArray:
     """``warp`` of Eq. (11), Li et al. 2025: angles into (-pi, pi]."""
     wrapped: FloatArray = np.pi - np.mod(np.pi - np.asarray(angle_rad, dtype=np.float64), 2.0 * np.pi)
     return wrapped
+
+
+@njit(cache=True)
+def wrap_compiled(angle_rad: Real) -> Real:
+    """``wrap`` for compiled callers, and for a single number in Python, where it is ten times faster."""
+    return math.pi - (math.pi - angle_rad) % (2.0 * math.pi)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def wrap_near_zero(angle_rad: float) -> float:
+    """An angle into [-pi, pi] by adding or subtracting whole turns: faster than a modulo for at most a few of them."""
+    while angle_rad > math.pi:
+        angle_rad -= 2.0 * math.pi
+    while angle_rad < -math.pi:
+        angle_rad += 2.0 * math.pi
+    return angle_rad
 
 
 def compose(a: FloatArray, b: FloatArray) -> FloatArray:

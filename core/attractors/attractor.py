@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, TypeAlias
+from typing import ClassVar, Literal
 
 import numpy as np
 from numba import njit
 
+from hippodrome.core.se2 import Real, wrap_compiled
 from hippodrome.core.types import FloatArray
 
 INTEGRATOR, CALIBRATION = 0, 1
-Real: TypeAlias = Any  # a float or a FloatArray: numba compiles each case
 
 UNINFORMED = 1e-2  # share of the total information below which a network counts as uniform: nothing to inhibit
 
@@ -46,15 +46,9 @@ def paper_config(information: float = 100.0, inhibition_calibration: float = 0.2
 
 
 @njit(cache=True)
-def wrap(angle_rad: Real) -> Real:
-    """Angles into (-pi, pi]; ``core.se2.wrap`` for compiled callers."""
-    return math.pi - (math.pi - angle_rad) % (2.0 * math.pi)
-
-
-@njit(cache=True)
 def belief(theta_rad: Real, mu: Real, reliability: Real) -> Real:
     """Eq. (1), Li et al. 2025: density of a population at the cells ``theta_rad``; |.| is the distance on the circle."""
-    return np.sqrt(reliability / (2.0 * math.pi)) * np.exp(-0.5 * reliability * wrap(theta_rad - mu) ** 2)
+    return np.sqrt(reliability / (2.0 * math.pi)) * np.exp(-0.5 * reliability * wrap_compiled(theta_rad - mu) ** 2)
 
 
 @njit(cache=True)
@@ -92,7 +86,7 @@ def mutual_inhibition(r_inte: Real, r_cali: Real, delta_inte: Real, delta_cali: 
 @njit(cache=True)
 def circular_mean(mu_a: Real, mu_b: Real, weight_b: Real) -> Real:
     """Weighted mean on the circle, along the shorter arc from ``mu_a`` to ``mu_b``; weight_b in [0, 1]."""
-    return wrap(mu_a + weight_b * wrap(mu_b - mu_a))
+    return wrap_compiled(mu_a + weight_b * wrap_compiled(mu_b - mu_a))
 
 
 @njit(cache=True)
@@ -113,7 +107,7 @@ def read_out(mu_inte: Real, r_inte: Real, mu_cali: Real, r_cali: Real) -> tuple[
 def overlap(mu_inte: Real, r_inte: Real, mu_cali: Real, r_cali: Real) -> Real:
     """How far two beliefs agree, 1 (same mean) to 0: exp(-d^2 / 2(sigma_inte^2 + sigma_cali^2))."""
     sq_sigma = 1.0 / r_inte + 1.0 / r_cali
-    return np.exp(-0.5 * wrap(mu_cali - mu_inte) ** 2 / sq_sigma)
+    return np.exp(-0.5 * wrap_compiled(mu_cali - mu_inte) ** 2 / sq_sigma)
 
 
 @njit(cache=True)

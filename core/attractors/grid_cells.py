@@ -14,7 +14,8 @@ import numpy as np
 from numba import njit
 
 from hippodrome.core.attractors import attractor
-from hippodrome.core.attractors.attractor import AttractorConfig, wrap
+from hippodrome.core.attractors.attractor import AttractorConfig
+from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
 PERIOD_RATIOS = (97.0, 131.0, 173.0)  # pairwise coprime: the joint code repeats only after 97 * 131 * 173 units
@@ -58,7 +59,7 @@ def known(position: FloatArray, period: FloatArray, config: AttractorConfig) -> 
 
 def phase(position: FloatArray, period: FloatArray) -> FloatArray:
     """Phases (M, 2) on the tori of a position (2,)."""
-    phases: FloatArray = wrap(TURN * position[None, :] / period[:, None])
+    phases: FloatArray = wrap_compiled(TURN * position[None, :] / period[:, None])
     return phases
 
 
@@ -77,7 +78,7 @@ def _integrate(
         per_length = 2.0 * math.pi / period[m]
         for a in range(2):
             for p in range(2):
-                mean[m, p, a] = wrap(old_mean[m, p, a] + step[p, a] * per_length)
+                mean[m, p, a] = wrap_compiled(old_mean[m, p, a] + step[p, a] * per_length)
             if sq_sigma[0, a] != 0.0 or sq_sigma[1, a] != 0.0:
                 reliability[m, 0, a], reliability[m, 1, a] = attractor.forget(
                     old_mean[m, 0, a],
@@ -190,7 +191,7 @@ def _decode(mean: FloatArray, reliability: FloatArray, period: FloatArray, near:
     best = np.empty(2)
     for a in range(2):
         sheets = math.ceil(reach / period[0])
-        home = near[a] + wrap(mean[0, a] - 2.0 * math.pi * near[a] / period[0]) * period[0] / (2.0 * math.pi)
+        home = near[a] + wrap_compiled(mean[0, a] - 2.0 * math.pi * near[a] / period[0]) * period[0] / (2.0 * math.pi)
         best_cost = math.inf
         for k in range(-sheets, sheets + 1):
             candidate = home + k * period[0]
@@ -198,12 +199,12 @@ def _decode(mean: FloatArray, reliability: FloatArray, period: FloatArray, near:
             for m in range(mean.shape[0]):  # weighted least squares about the candidate
                 per_length = 2.0 * math.pi / period[m]
                 information = reliability[m, a] * per_length**2
-                shift += information * wrap(mean[m, a] - candidate * per_length) / per_length
+                shift += information * wrap_compiled(mean[m, a] - candidate * per_length) / per_length
                 weight += information
             candidate += shift / weight
             cost = 0.0
             for m in range(mean.shape[0]):
-                cost += reliability[m, a] * wrap(mean[m, a] - 2.0 * math.pi * candidate / period[m]) ** 2
+                cost += reliability[m, a] * wrap_compiled(mean[m, a] - 2.0 * math.pi * candidate / period[m]) ** 2
             if cost < best_cost or (cost == best_cost and abs(candidate - near[a]) < abs(best[a] - near[a])):
                 best[a], best_cost = candidate, cost
     return best

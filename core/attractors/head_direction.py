@@ -8,6 +8,7 @@ import numpy as np
 
 from hippodrome.core.attractors import attractor
 from hippodrome.core.attractors.attractor import CALIBRATION, INTEGRATOR, AttractorConfig
+from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
 
@@ -27,7 +28,7 @@ def uniform(config: AttractorConfig) -> HeadDirectionState:
 def known(heading_rad: float, config: AttractorConfig) -> HeadDirectionState:
     """A known heading: the integrator holds E, the calibration cells their share of it."""
     reliability = config.information * np.array([1.0, config.calibration_share])
-    return HeadDirectionState(np.full(2, attractor.wrap(heading_rad)), reliability)
+    return HeadDirectionState(np.full(2, wrap_compiled(heading_rad)), reliability)
 
 
 def integrate(
@@ -36,7 +37,7 @@ def integrate(
     """Path integration: both peaks turn by omega dt; the motion adds ``sq_sigma_rad`` to each's variance (0: as printed)."""
     turned = omega_radps * dt_s
     (mu_inte, mu_cali), (r_inte, r_cali) = state.mean_rad.tolist(), state.reliability.tolist()
-    mean = np.array([attractor.wrap(mu_inte + turned), attractor.wrap(mu_cali + turned)])
+    mean = np.array([wrap_compiled(mu_inte + turned), wrap_compiled(mu_cali + turned)])
     if sq_sigma_rad == (0.0, 0.0):
         return HeadDirectionState(mean, state.reliability)
     return HeadDirectionState(mean, np.array(attractor.forget(mu_inte, r_inte, mu_cali, r_cali, *sq_sigma_rad)))
@@ -73,7 +74,7 @@ def hand_back(state: HeadDirectionState, config: AttractorConfig) -> HeadDirecti
 def challenge(state: HeadDirectionState, heading_rad: float, reliability: float) -> HeadDirectionState:
     """Calibration cells leave for a conflicting heading; the integrator keeps its own, and the two compete."""
     return HeadDirectionState(
-        np.array([state.mean_rad[INTEGRATOR], attractor.wrap(heading_rad)]),
+        np.array([state.mean_rad[INTEGRATOR], wrap_compiled(heading_rad)]),
         np.array([state.reliability[INTEGRATOR], reliability]),
     )
 

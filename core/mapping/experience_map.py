@@ -140,7 +140,7 @@ def _relax(poses: FloatArray, source: IntArray, target: IntArray, motion: FloatA
             cos, sin = np.cos(poses[a, 2]), np.sin(poses[a, 2])
             dx = poses[a, 0] + cos * motion[e, 0] - sin * motion[e, 1] - poses[b, 0]
             dy = poses[a, 1] + sin * motion[e, 0] + cos * motion[e, 1] - poses[b, 1]
-            turn = np.pi - (np.pi - (poses[a, 2] + motion[e, 2] - poses[b, 2])) % (2.0 * np.pi)
+            turn = se2.wrap_compiled(poses[a, 2] + motion[e, 2] - poses[b, 2])
             poses[a, 0] -= share * dx
             poses[a, 1] -= share * dy
             poses[a, 2] -= share * turn

@@ -1,6 +1,9 @@
 """SE(2) obeys the group axioms, and dead reckoning composes motions one by one."""
 
+import math
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -37,3 +40,10 @@ def test_integration_composes_one_motion_after_another(start, motions):
     for motion, reached in zip(motions, se2.integrate(start, motions), strict=True):
         expected = se2.compose(expected, motion)
         assert_same_pose(reached, expected)
+
+
+@given(st.floats(-20.0, 20.0))
+def test_the_three_ways_to_wrap_agree(angle_rad):
+    wrapped = float(se2.wrap(np.array(angle_rad)))
+    assert se2.wrap_compiled(angle_rad) == pytest.approx(wrapped, abs=1e-12)
+    assert abs(math.remainder(se2.wrap_near_zero(angle_rad) - wrapped, 2.0 * math.pi)) < 1e-12

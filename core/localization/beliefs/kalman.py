@@ -7,7 +7,6 @@ from typing import Self
 
 import numpy as np
 
-from hippodrome.core.attractors.attractor import wrap
 from hippodrome.core.localization.beliefs.motion import (
     Motion,
     correction,
@@ -16,6 +15,7 @@ from hippodrome.core.localization.beliefs.motion import (
     predicted_covariance,
 )
 from hippodrome.core.localization.config import Injection, LocalizerConfig
+from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
 UNKNOWN = np.diag([1e8, 1e8, 1e2])  # m^2, m^2, rad^2: no prior knowledge of the pose
@@ -96,12 +96,12 @@ class KalmanPose:
 def _predict(belief: Gaussian, motion: Motion, config: LocalizerConfig) -> Gaussian:
     x_m, y_m, heading_rad, log_scale = belief.mean.tolist()
     east_m, north_m = displacement_m(heading_rad, log_scale, motion)
-    mean = np.array([x_m + east_m, y_m + north_m, wrap(heading_rad + motion.turned_rad), log_scale])
+    mean = np.array([x_m + east_m, y_m + north_m, wrap_compiled(heading_rad + motion.turned_rad), log_scale])
     return Gaussian(mean, predicted_covariance(belief.covariance, heading_rad, log_scale, motion, config.motion))
 
 
 def _update(belief: Gaussian, injection: Injection) -> Gaussian:
     shift, covariance = correction(belief.covariance, innovation(belief.mean[:3], injection), injection)
     mean = belief.mean + shift
-    mean[2] = wrap(mean[2])
+    mean[2] = wrap_compiled(mean[2])
     return Gaussian(mean, covariance)

@@ -14,11 +14,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from hippodrome.core.attractors.attractor import wrap
 from hippodrome.core.localization.beliefs.motion import Motion
 from hippodrome.core.localization.config import Injection, LocalizerConfig
 from hippodrome.core.roads.lane_graph import LaneGraph, build_lane_graph
 from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
 BIN_M = 2.0
@@ -87,7 +87,7 @@ class LanePose:
         noise, waiting = self.config.motion, self.waiting
         walk = max(noise.gyro_rad_per_sqrt_s, motion.gyro_rad_per_sqrt_s)
         sq_heading = min(SQ_UNKNOWN, self.sq_heading + walk**2 * motion.dt_s + (noise.gyro_gain * motion.turned_rad) ** 2)
-        heading_rad = float(wrap(self.heading_rad + motion.turned_rad))
+        heading_rad = float(wrap_compiled(self.heading_rad + motion.turned_rad))
         waiting = Motion(waiting.travelled + motion.travelled, waiting.turned_rad + motion.turned_rad, waiting.dt_s + motion.dt_s)
         moved = replace(self, waiting=waiting, heading_rad=heading_rad, sq_heading=sq_heading)
         due = waiting.travelled * math.exp(float(self.log_scales[SCALE_STEPS // 2])) >= SPREAD_M
@@ -103,7 +103,7 @@ class LanePose:
         walk = noise.scale_walk_per_sqrt_m**2 * driven.travelled * math.exp(self.log_scale) / (2.0 * SCALE_STEP**2)
         padded = np.pad(moved, ((1, 1), (0, 0)), mode="edge")
         moved = (1.0 - 2.0 * walk) * moved + walk * (padded[:-2] + padded[2:])
-        turned = wrap(graph.heading_rad - self.heading_rad)
+        turned = wrap_compiled(graph.heading_rad - self.heading_rad)
         seen = moved * (OUTLIER + np.exp(-0.5 * turned**2 / (self.sq_heading + LANE_HEADING_RAD**2)))[None, :]
         total, anywhere = float(seen.sum()), _anywhere(self.belief)
         kept = (1.0 - ANYWHERE) * seen / total if total > 0.0 else 0.0
@@ -114,16 +114,16 @@ class LanePose:
         moved = self._spread() if self.waiting.travelled * math.exp(self.log_scale) >= BIN_M else self
         apart = moved.graph.points_m - injection.pose[:2]
         sq = np.einsum("ni,ij,nj->n", apart, np.linalg.inv(injection.covariance[:2, :2] + BIN_M**2 / 12.0 * np.eye(2)), apart)
-        sq += wrap(moved.graph.heading_rad - injection.pose[2]) ** 2 / (injection.covariance[2, 2] + LANE_HEADING_RAD**2)
+        sq += wrap_compiled(moved.graph.heading_rad - injection.pose[2]) ** 2 / (injection.covariance[2, 2] + LANE_HEADING_RAD**2)
         belief = moved.belief * (OUTLIER + np.exp(-0.5 * sq))[None, :]
-        difference = float(wrap(injection.pose[2] - self.heading_rad))
+        difference = float(wrap_compiled(injection.pose[2] - self.heading_rad))
         total = self.sq_heading + injection.covariance[2, 2]
         agrees = difference**2 < self.config.injection.gate * total
         gain = float(self.sq_heading / total) if agrees else 0.5  # a conflict: either may be the wrong one
         return replace(
             moved,
             belief=belief / belief.sum(),
-            heading_rad=float(wrap(self.heading_rad + gain * difference)),
+            heading_rad=float(wrap_compiled(self.heading_rad + gain * difference)),
             sq_heading=float((1.0 - gain) * self.sq_heading + (0.0 if agrees else 0.25 * difference**2)),
         )
 

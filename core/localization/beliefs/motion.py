@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from hippodrome.core.attractors.attractor import wrap
 from hippodrome.core.localization.config import Injection, MotionNoise
+from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
 
@@ -69,7 +69,7 @@ def displacement_m(heading_rad: float, log_scale: float, motion: Motion) -> tupl
 def innovation(pose: FloatArray, injection: Injection) -> FloatArray:
     """Injected pose (3,) minus ``pose``, the heading along the shorter arc."""
     difference: FloatArray = injection.pose - pose
-    difference[2] = wrap(difference[2])
+    difference[2] = wrap_compiled(difference[2])
     return difference
 
 

@@ -39,16 +39,6 @@ OFF = np.dtype([("x", np.float32), ("y", np.float32), ("away", np.float32)], ali
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def wrap(angle: float) -> float:
-    """An angle into [-pi, pi]; the callers' sums lie within a few turns, where this is far quicker than a modulo."""
-    while angle > math.pi:
-        angle -= 2.0 * math.pi
-    while angle < -math.pi:
-        angle += 2.0 * math.pi
-    return angle
-
-
-@njit(cache=True, error_model="numpy", inline="always")
 def put(rows: Rows, at: int, bin_: int, k: int, parent: int, score: float, offset: float, rest: float) -> None:
     row = rows[at]
     row.bin, row.k, row.parent, row.score, row.offset, row.rest = bin_, k, parent, score, offset, rest

@@ -21,8 +21,8 @@ from hippodrome.core.matching.search.hypotheses import (
     Rows,
     Tables,
     put,
-    wrap,
 )
+from hippodrome.core.se2 import wrap_near_zero
 
 Place: TypeAlias = tuple[float, float, float]
 
@@ -61,7 +61,7 @@ def expand_off(
         for c in range(cell_start[row * columns + column_0], cell_start[row * columns + column_1 + 1]):
             bin_ = cell_bin[c]
             gap_sq = (points[bin_, 0] - x) ** 2 + (points[bin_, 1] - y) ** 2
-            turn = wrap(bin_heading[bin_] - heading - offset)
+            turn = wrap_near_zero(bin_heading[bin_] - heading - offset)
             if gap_sq > radius * radius or abs(turn) > turn_limit:
                 continue
             if count == out.shape[0]:
@@ -69,7 +69,7 @@ def expand_off(
             out[count, 0] = bin_
             out[count, 1] = k
             out[count, 2] = -(enter + 0.5 * gap_sq / spread**2 + min(0.5 * (turn / sigma) ** 2, limit))
-            out[count, 3] = wrap(offset + gain * min(max(turn, -3.0 * sigma), 3.0 * sigma))
+            out[count, 3] = wrap_near_zero(offset + gain * min(max(turn, -3.0 * sigma), 3.0 * sigma))
             out[count, 4] = 0.0
             count += 1
     return count
@@ -115,7 +115,7 @@ def drive_off(
             there = off_rows[-1 - rows[other].bin]
             if (
                 abs(there.x - x) + abs(there.y - y) < _SAME_PLACE_M
-                and abs(wrap(rows[other].offset - row.offset)) < _SAME_OFFSET_RAD
+                and abs(wrap_near_zero(rows[other].offset - row.offset)) < _SAME_OFFSET_RAD
             ):
                 at = other
             worst = other if rows[other].score < rows[worst].score else worst

@@ -15,9 +15,9 @@ from hippodrome.core.matching.search.hypotheses import (
     OffRows,
     Rows,
     Tables,
-    wrap,
 )
 from hippodrome.core.matching.search.off_network import expand_off, move_off
+from hippodrome.core.se2 import wrap_near_zero
 
 MOST_SUCCESSORS = 2048  # of one hypothesis: a few bins x scale bins x branches of a junction, or the bins round a place
 _FARTHEST_JUMP = 12  # scale bins: 50 % either way
@@ -57,7 +57,7 @@ def expand(
             if error > window:
                 continue
             target = reach_bin[r]
-            beyond, turn = (abs(error) - half) * per_length, wrap(bin_heading[target] - course)
+            beyond, turn = (abs(error) - half) * per_length, wrap_near_zero(bin_heading[target] - course)
             cost = move_cost + change_cost * reach_changes[r] + min(0.5 * (turn * per_sigma) ** 2, limit)
             if beyond > 0.0:
                 cost += 0.5 * beyond * beyond
@@ -71,7 +71,7 @@ def expand(
             out[count, 0] = target
             out[count, 1] = k
             out[count, 2] = -cost
-            out[count, 3] = wrap(offset + gain * min(max(turn, -most_turn), most_turn))
+            out[count, 3] = wrap_near_zero(offset + gain * min(max(turn, -most_turn), most_turn))
             out[count, 4] = min(max(error, -half), half)
             count += 1
     return count

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from hippodrome.core.attractors import head_direction as ring
-from hippodrome.core.attractors.attractor import AttractorConfig, paper_config, wrap
+from hippodrome.core.attractors.attractor import AttractorConfig, paper_config
+from hippodrome.core.se2 import wrap_compiled
 
 CONFIG = AttractorConfig()
 heading = st.floats(-3.1, 3.1)
@@ -19,7 +20,7 @@ def test_integration_adds_the_turns(start, rates):
     state = ring.known(start, CONFIG)
     for rate in rates:
         state = ring.integrate(state, rate, 0.1)
-    assert_allclose(wrap(state.mean_rad - start - 0.1 * sum(rates)), 0.0, atol=1e-9)
+    assert_allclose(wrap_compiled(state.mean_rad - start - 0.1 * sum(rates)), 0.0, atol=1e-9)
 
 
 def test_start_holds_e_and_its_tenth():

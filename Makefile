@@ -53,8 +53,9 @@ bench: setup  ## speed and memory, as ratios measured in one run
 docs: setup  ## make the tables of docs/scenarios.md anew from the models
 	@$(BIN)/python -m hippodrome.eval.authoring.reference docs/scenarios.md
 
-site: setup  ## this documentation and the docstrings as pages, in out/site; a broken link fails
-	@$(BIN)/mkdocs build --strict --quiet --clean --site-dir out/site && echo "out/site/index.html"
+site: setup  ## these documents and the docstrings as pages, in out/site; broken links fail
+	@$(BIN)/python docs/site/make.py out/site-sources
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --clean && echo "written: out/site/index.html"
 
 cover: eval  ## make the README's picture and table anew from the default run
 	@$(BIN)/python -m hippodrome.eval.report.cover out/eval grid

@@ -1,7 +1,7 @@
 """The sources of the documentation's pages: ``python docs/site/make.py FOLDER``; `make site` then builds the pages from them.
 
 The folder gets the files of ``docs/``, the README as start page, CONTRIBUTING and CHANGELOG, and a reference made from the front
-door and the packages of ``core``. Links are written for a reader of the repository, ``docs/metrics.md``. Here they are turned to the
+door and the packages of ``core``. Links are written for a reader of the repository, ``docs/metrics.md``. Here they lead to the
 pages of the site, and a link to a file that has no page, such as a scenario, becomes plain text.
 """
 

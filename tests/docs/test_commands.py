@@ -15,6 +15,7 @@ import pytest
 
 from benchmarks.same.__main__ import _parser as parser_of_same
 from hippodrome.eval.cli import _parser, main
+from hippodrome.eval.sweep.grid import make_grid, parse_parameter
 from tests.docs.documents import ROOT, documents
 
 DOCUMENTS = pytest.mark.parametrize("page", documents(), ids=str)
@@ -111,6 +112,16 @@ def test_every_command_is_accepted_by_the_parser(page, capsys):
                 PARSERS[""].parse_args(words)
             except SystemExit:
                 pytest.fail(f"{page}: hippodrome {' '.join(words)}: {capsys.readouterr().err}")
+            known = PARSERS[" ".join(words[:2])] if " ".join(words[:2]) in PARSERS else PARSERS[words[0]]
+            assert {word for word in words if word.startswith("--")} <= set(known._option_string_actions), f"{page}: {command}"
+
+
+@DOCUMENTS
+def test_every_parameter_of_a_sweep_is_one_and_takes_the_values_shown(page):
+    for command in commands(page):
+        shown = [parameter for words in variants(command) for parameter in words if re.match(r"[a-z][\w.]*=", parameter)]
+        if command.startswith("sweep "):
+            make_grid([ROOT / "scenarios/paper.yaml"], None, [parse_parameter(text) for text in dict.fromkeys(shown)])
 
 
 @DOCUMENTS

@@ -283,4 +283,8 @@ def _written(name):
     if any(name in text for text in sources().values()):
         return True
     pieces = [piece for piece in re.split(r"METHOD|NN|\*|<\w+>|(?<=-)(?=\w)|(?=\.)", name) if piece]
-    return any(all(piece in text for piece in pieces) for text in sources().values())
+    return any(all(_stands_alone(piece, text) for piece in pieces) for text in sources().values())
+
+
+def _stands_alone(piece, text):
+    return re.search(rf"(?<!\w){re.escape(piece)}" + (r"(?!\w)" if piece[-1].isalnum() else ""), text)

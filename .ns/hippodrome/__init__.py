@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from hippodrome.core.localization.localizer import Localizer, localize
     from hippodrome.core.mapping.mapper import Mapper, map_drive
-    from hippodrome.core.mapping.mapper import build_map as map_drive
     from hippodrome.core.refinement.refine import refine
     from hippodrome.core.roads.network import RoadNetwork
     from hippodrome.core.types import CognitiveMap, Observation, StartPose, Trajectory

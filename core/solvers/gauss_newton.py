@@ -55,8 +55,8 @@ def gauss_newton(
 def factorise(matrix: csc_array) -> SuperLU:
     """Sparse factors of a symmetric positive definite matrix.
 
-    SciPy has no sparse Cholesky: this LU keeps its pivots on the diagonal, in an order that is the same for rows and columns, and so
-    costs and fills in no more than Cholesky would.
+    SciPy has no sparse Cholesky: this LU keeps its pivots on the diagonal and one order for rows and columns, and so costs and
+    fills in no more than Cholesky would.
     """
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
@@ -65,8 +65,8 @@ def block_jacobian(blocks: list[tuple[FloatArray, IntArray]], state_size: int) -
     """Sparse Jacobian (E * m, state_size) of E residuals of m rows each, from dense blocks.
 
     Args:
-        blocks: for each variable that a residual depends on (an edge's two poses, say), the derivatives (E, m, p) of all residuals
-            by that variable, and the index (E,) in the state at which the variable's p entries begin.
+        blocks: for each variable that a residual depends on (an edge's two poses, say), the derivatives (E, m, p) of all
+            residuals by that variable, and the index (E,) in the state at which the variable's p entries begin.
         state_size: entries of the state.
     """
     rows, columns, values = [], [], []

@@ -1,7 +1,7 @@
 """Costs of the topometric map, Eqs. (10)-(12), Li et al. 2025, as residuals with sparse Jacobians.
 
-The state that the Jacobians refer to is the poses (V, 3), flattened row by row. The paper prints sums of norms and then solves "the
-least squares problem based on (12)"; least squares needs the norms squared, and so they are here.
+The state that the Jacobians refer to is the poses (V, 3), flattened row by row. The paper prints sums of norms and then solves
+"the least squares problem based on (12)"; least squares needs the norms squared, and so they are here.
 """
 
 from __future__ import annotations

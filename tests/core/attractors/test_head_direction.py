@@ -74,8 +74,7 @@ def test_conflict_keeps_two_beliefs_until_one_is_adopted():
 def test_steps_do_not_touch_their_argument():
     state = head_direction.known(0.3, CONFIG)
     before = (state.mean_rad.copy(), state.reliability.copy())
-    head_direction.inhibit(
-        head_direction.inject(head_direction.integrate(state, 1.0, 0.1, (0.1, 0.1)), 1.0, 10.0, CONFIG), 0.1, CONFIG
-    )
+    turned = head_direction.integrate(state, 1.0, 0.1, (0.1, 0.1))
+    head_direction.inhibit(head_direction.inject(turned, 1.0, 10.0, CONFIG), 0.1, CONFIG)
     assert np.array_equal(state.mean_rad, before[0])
     assert np.array_equal(state.reliability, before[1])

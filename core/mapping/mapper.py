@@ -55,7 +55,7 @@ class Mapper:
         self._config = config
         self._since_keyframe = keyframes.start()
         self._memory = PlaceMemory(config.memory)
-        self._t_s: list[float] = []  # of each keyframe
+        self._t_s: list[float] = []  # time of each keyframe
         self._motions: list[FloatArray] = []  # raw motion to each keyframe from the one before
         self._closures: list[Closure] = []
         self._neural: NeuralPose | None = None  # the networks now; None until they start

@@ -58,7 +58,7 @@ class PlaceMemoryConfig:
 class Recognition:
     """The place of a keyframe is one seen before."""
 
-    vertex: int  # of the keyframe
+    vertex: int  # the keyframe's vertex
     cell: int  # view cell of the place
     margin: float  # filtered margin of the view that triggered this recognition
     along: float  # map units that the keyframe lies ahead of the vertex that made the cell
@@ -88,7 +88,7 @@ class PlaceMemory:
         self._views = ViewStore(config.view_cells)
         self._query_mean = start_query_mean(np.zeros(size, dtype=np.float32))
         self._pending: deque[_PendingView] = deque()
-        self._last_cell = -1  # of the keyframe stored last
+        self._last_cell = -1  # cell of the keyframe stored last
         self.vertex_cell: list[int] = []  # (V,) the cell of each vertex stored so far
         self.cell_vertex: list[int] = []  # (C,) the vertex that made each cell
 

@@ -10,8 +10,10 @@ from hippodrome.core.refinement.residuals import Factors, State, normal_equation
 from hippodrome.core.solvers.chain import factorise, marginals
 from hippodrome.core.types import Edges, FloatArray
 
-PLACE_SIGMA_M = 0.1  # of a lane as it is driven: corners cut, polylines for curves, wander; correlated, so it never averages out
-HEADING_SIGMA_RAD = 0.01  # likewise of its heading: a wander of 0.1 m over some 60 m
+# How far a lane as it is driven lies from the lane as it is drawn: corners are cut, curves are polylines, drivers wander. These
+# errors are correlated along the lane, so that they never average out.
+PLACE_SIGMA_M = 0.1
+HEADING_SIGMA_RAD = 0.01  # a wander of 0.1 m over some 60 m
 
 
 def posterior_covariance(state: State, factors: Factors, closures: Edges) -> FloatArray:

@@ -34,10 +34,8 @@ class Noise:
     lateral_m: float = 0.3  # lateral sigma: the vehicle's distance from the lane's centreline
     lane_heading_rad: float = 0.05  # the vehicle's heading against the lane's direction
     closure_factor: float = 1.0  # factor on the closures' own sigmas
-    scale_inverse_freedom: float = (
-        0.25  # 1 over the degrees of freedom of the scale's steps (Student-t), which may jump; 0: normal
-    )
-    road_inverse_freedom: float = 1.0  # likewise of the road's residuals: Cauchy, as turns are drawn otherwise than driven
+    scale_inverse_freedom: float = 0.25  # 1 / degrees of freedom (Student-t) of the scale's steps, which may jump; 0: normal
+    road_inverse_freedom: float = 1.0  # the same of the road's residuals: 1 is Cauchy, as turns are drawn otherwise than driven
 
     def step_sigmas(self, length_m: FloatArray) -> FloatArray:
         """Sigmas (N, 4) of along, across, heading and log scale over steps of the given lengths (N,)."""

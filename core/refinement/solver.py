@@ -33,12 +33,7 @@ class SolverConfig:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    along_sigma_m: tuple[float, ...] = (
-        3.0,
-        6.0,
-        12.0,
-        *[np.inf] * 8,
-    )  # sigma along the lane, per round; .inf: drawn to a line
+    along_sigma_m: tuple[float, ...] = (3.0, 6.0, 12.0, *[np.inf] * 8)  # sigma along the lane, per round; .inf: not held along it
     inner_iterations: int = 2
     reprojection_m: float = 4.0  # arc length by which a keyframe's place on the route may move in one round
     unvouched_weight: float = 1e-6  # weight of the road where nothing vouches for it: it determines a pose without pulling it

@@ -87,8 +87,9 @@ class VisualOdometry:
             if self._last is not None:
                 moved = np.array(self._motion_between(self._last, grey))
                 step, self._rates = moved - self._reported, moved / self._since_frame_s
-            self._last, self._since_frame_s, self._reported = grey, 0.0, -step
-        self._reported = self._reported + step
+            self._last, self._since_frame_s, self._reported = grey, 0.0, np.zeros(2)
+        else:
+            self._reported = self._reported + step
         return replace(observation, speed=float(step[0]) / observation.dt_s, yaw_rate_radps=float(step[1]) / observation.dt_s)
 
     def _motion_between(self, before: Grey, after: Grey) -> tuple[float, float]:

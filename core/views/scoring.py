@@ -26,7 +26,7 @@ class ViewCellBank:
     """Stored views (local view cells), ready to be scored against a query."""
 
     kind: Kind
-    shape: tuple[int, ...]  # of a descriptor before flattening
+    shape: tuple[int, ...]  # shape of a descriptor before flattening
     templates: Descriptor  # (C, D)
     mean: Float32Array  # (D,) what all views share
     inverse_norm: Float32Array  # (C,) 1 / |template - mean|; ones for "grey"

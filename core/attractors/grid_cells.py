@@ -4,8 +4,8 @@ A torus knows a position only up to whole periods. "Sheet" is what we call each 
 apart: with one torus, the read-out locks to a wrong sheet once drift exceeds half a period. Modules of unequal periods together
 tell the sheets apart over kilometres (a departure: the paper has a single torus).
 
-Lengths are in the caller's unit: map units while mapping, metres while localizing. An immutable state, and
-pure functions on it, as in ``head_direction``.
+Lengths are in the caller's unit: map units while mapping, metres while localizing. An immutable state, and pure functions on it,
+as in ``head_direction``.
 """
 
 from __future__ import annotations
@@ -130,8 +130,8 @@ def stimulate(state: GridState, position: FloatArray, reliability: FloatArray) -
     ``reliability`` (2 axes,) is in 1/length^2.
     """
     mean, total = state.mean_rad.copy(), state.reliability.copy()
-    mean[:, 1], total[:, 1] = attractor.inject(
-        mean[:, 1], total[:, 1], phase(position, state.period), phase_reliability(reliability, state.period)
+    mean[:, CALIBRATION], total[:, CALIBRATION] = attractor.inject(
+        mean[:, CALIBRATION], total[:, CALIBRATION], phase(position, state.period), phase_reliability(reliability, state.period)
     )
     return GridState(state.period, mean, total)
 
@@ -154,8 +154,8 @@ def hand_back(state: GridState, config: AttractorConfig) -> GridState:
 def challenge(state: GridState, position: FloatArray, reliability: FloatArray) -> GridState:
     """The calibration cells take over a conflicting position (2,), reliability (2,) in 1/length^2; the two then compete."""
     mean, total = state.mean_rad.copy(), state.reliability.copy()
-    mean[:, 1] = phase(position, state.period)
-    total[:, 1] = phase_reliability(reliability, state.period)
+    mean[:, CALIBRATION] = phase(position, state.period)
+    total[:, CALIBRATION] = phase_reliability(reliability, state.period)
     return GridState(state.period, mean, total)
 
 
@@ -184,8 +184,7 @@ def fused(state: GridState) -> tuple[FloatArray, FloatArray]:
 def read_out(state: GridState, near: FloatArray, reach: float = 0.0) -> tuple[FloatArray, FloatArray]:
     """The fused position, Eqs. (15)-(16), Li et al. 2025, and its reliability.
 
-    The modules hold one and the same belief on different tori, not independent ones: their reliabilities average, they do not
-    add.
+    The modules hold one and the same belief on different tori, not independent ones: their reliabilities are averaged, not added.
 
     Args:
         state: of all modules.

@@ -3,8 +3,7 @@
 They do not bend the map: its edges hold raw odometry, as the read-out of a network jumps with every injection.
 
 They start once the memory could recognise a place. Until then nothing can be injected, so that the states at earlier vertices
-follow from dead reckoning; and by then the typical way between keyframes is known, which the periods of the tori are multiples
-of.
+follow from dead reckoning; and by then the typical way between keyframes is known, from which the tori get their periods.
 """
 
 from __future__ import annotations

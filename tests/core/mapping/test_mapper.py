@@ -178,6 +178,14 @@ def test_a_drive_without_views_is_an_error():
         Mapper(CONFIG).finish()
 
 
+def test_the_constants_have_defaults(drive):
+    by_default, mapper = map_drive(drive[0][:400]), Mapper()
+    for observation in drive[0][:400]:
+        mapper.step(observation)
+    assert len(by_default.poses) > 10
+    assert mapper.finish().poses.tobytes() == by_default.poses.tobytes() == map_drive(drive[0][:400], CONFIG).poses.tobytes()
+
+
 def test_progress_hears_every_observation(drive):
     heard = []
     map_drive(drive[0][:50], CONFIG, heard.append)

@@ -77,7 +77,7 @@ def test_distant_couplings_are_solved_to_the_tolerance(system):
 
 
 def test_the_recursions_by_hand():
-    """T = [[2, 1], [1, 2]], no border to speak of: pivots 2 and 2 - 1 / 2, gain 1 / 2, and the inverse is [[2, -1], [-1, 2]] / 3."""
+    """T = [[2, 1], [1, 2]], its border not coupled: pivots 2 and 2 - 1 / 2, gain 1 / 2, inverse [[2, -1], [-1, 2]] / 3."""
     blocks = np.full((2, 1, 1), 2.0), np.ones((1, 1, 1))
     system = ChainSystem(*blocks, np.zeros((2, 1, 1)), np.ones((1, 1)), np.array([[3.0], [0.0]]), np.array([5.0]))
     factor = factorise(system)

@@ -202,7 +202,7 @@ def _inverse(a: FloatArray) -> FloatArray:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _cholesky(a: FloatArray) -> FloatArray:
     """Lower triangular L with L L^T = A, row by row (``np.linalg.cholesky`` costs more than this on 4 x 4)."""
     n = a.shape[0]
@@ -216,7 +216,7 @@ def _cholesky(a: FloatArray) -> FloatArray:
     return lower
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _inverse_of_lower(lower: FloatArray) -> FloatArray:
     """L^-1 by forward substitution, column by column."""
     n = lower.shape[0]
@@ -230,7 +230,7 @@ def _inverse_of_lower(lower: FloatArray) -> FloatArray:
     return inverse
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _multiply_into(out: FloatArray, a: FloatArray, b: FloatArray) -> None:
     """out = A B."""
     for i in range(out.shape[0]):
@@ -241,7 +241,7 @@ def _multiply_into(out: FloatArray, a: FloatArray, b: FloatArray) -> None:
             out[i, j] = total
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _subtract_product(out: FloatArray, a: FloatArray, b: FloatArray) -> None:
     """out -= A B."""
     for i in range(out.shape[0]):

@@ -17,14 +17,9 @@ from hippodrome.core.attractors import grid_cells, head_direction
 from hippodrome.core.attractors.attractor import AttractorConfig
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
 from hippodrome.core.types import AttractorStates, CognitiveMap, Edges, Frame, Observation, ViewCells, Visits
-from hippodrome.core.views.descriptors import (
-    ViewCellConfig,
-    bank_of,
-    describe,
-    start_query_mean,
-    template_mean,
-)
+from hippodrome.core.views.descriptors import ViewCellConfig, describe
 from hippodrome.core.views.index import SearchConfig, index_of, search
+from hippodrome.core.views.scoring import bank_of, start_query_mean, template_mean
 
 BANKS = (1_400, 10_000, 100_000)
 SPACING_M, ROW_M, ROWS_APART_M = 5.0, 2_000.0, 30.0

@@ -10,7 +10,7 @@ from hippodrome.core.attractors.grid_cells import GRID_INFORMATION
 from hippodrome.core.types import FloatArray
 from hippodrome.core.views.descriptors import ViewCellConfig
 from hippodrome.core.views.index import SearchConfig
-from hippodrome.core.views.keyframes import ViewStepConfig
+from hippodrome.core.views.keyframes import KeyframeConfig
 from hippodrome.core.views.odometry import CameraGeometry
 from hippodrome.core.views.sequence import SequenceConfig
 
@@ -82,7 +82,7 @@ class LocalizerConfig:
     camera: CameraGeometry = field(default_factory=CameraGeometry)  # for self_motion "visual"
     views: ViewCellConfig = field(default_factory=ViewCellConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
-    steps: ViewStepConfig = field(default_factory=lambda: ViewStepConfig(interval_s=0.4))  # denser than the map: 15 % less error
+    steps: KeyframeConfig = field(default_factory=lambda: KeyframeConfig(interval_s=0.4))  # denser than the map: 15 % less error
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
     motion: MotionNoise = field(default_factory=MotionNoise)
     injection: InjectionNoise = field(default_factory=InjectionNoise)

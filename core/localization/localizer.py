@@ -36,8 +36,8 @@ from hippodrome.core.types import (
     LocalizationStatus,
     Observation,
 )
-from hippodrome.core.views import keyframes as view_step
-from hippodrome.core.views.index import Found
+from hippodrome.core.views import keyframes
+from hippodrome.core.views.index import ScoredViews
 from hippodrome.core.views.odometry import VisualOdometry
 
 __all__ = ["Localizer", "LocalizerConfig", "localize"]
@@ -69,7 +69,7 @@ class Localizer:
         self._places = localizer_places.places_of(cognitive_map, network, config.lane_sigma_m, config.injection.map_m)
         self._belief = _unknown(cognitive_map, network, config)
         self._recogniser = PlaceRecogniser(self._places, config)
-        self._view_step = view_step.start()
+        self._view_step = keyframes.start()
         self._gyro = GyroNoise()
         self._odometry = VisualOdometry(config.camera) if config.self_motion == "visual" else None
         self._step_m, self._turned_rad = 0.0, 0.0  # since the last look
@@ -88,13 +88,13 @@ class Localizer:
         """Take one observation in."""
         observation = observation if self._odometry is None else self._odometry.step(observation)
         self._move(observation)
-        if observation.frame is not None and (self._cell < 0 or view_step.is_due(self._view_step, self._config.steps)):
+        if observation.frame is not None and (self._cell < 0 or keyframes.is_due(self._view_step, self._config.steps)):
             self._look(observation.frame)
         return self._estimate(observation.t_s)
 
     def _move(self, observation: Observation) -> None:
         travelled, turned_rad = observation.speed * observation.dt_s, observation.yaw_rate_radps * observation.dt_s
-        self._view_step = view_step.advance(self._view_step, observation, self._config.steps)
+        self._view_step = keyframes.advance(self._view_step, observation, self._config.steps)
         least_radps = self._config.motion.gyro_rad_per_sqrt_s / math.sqrt(observation.dt_s)
         self._gyro = gyro_noise.update(self._gyro, observation.yaw_rate_radps, least_radps)
         walk = self._gyro.sigma_radps * math.sqrt(observation.dt_s)
@@ -108,7 +108,7 @@ class Localizer:
         self._cell, self._margin = seen.cell, seen.margin
         first = self._weight == 0.0
         self._weight = 1.0 if first else min(1.0, self._step_m / config.independent_m)
-        self._view_step = view_step.restart(self._view_step)
+        self._view_step = keyframes.restart(self._view_step)
         self._step_m, self._turned_rad = 0.0, 0.0
         self._support, self._challenge = config.evidence_memory * self._support, config.evidence_memory * self._challenge
         if self._margin >= config.margin and self._places.usable[self._cell]:
@@ -121,7 +121,7 @@ class Localizer:
             return np.zeros(0, dtype=np.int32)
         return localizer_places.cells_here(self._places, self._belief.pose, _sigma_m(self._belief.covariance))
 
-    def _confirm(self, found: Found, here: IntArray) -> None:
+    def _confirm(self, found: ScoredViews, here: IntArray) -> None:
         """Where the map shows the believed place, the view has to be like it, whatever else it is like."""
         if not self._fixed:
             return

@@ -19,7 +19,7 @@ from hippodrome.core.roads import geometry as road_geometry
 from hippodrome.core.roads.geometry import RoadGeometry
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, Float32Array, FloatArray, IntArray, MatchStatus
-from hippodrome.core.views.descriptors import ViewCellBank, bank_of
+from hippodrome.core.views.scoring import ViewCellBank, bank_of
 
 LINK_REACH_M = 15.0  # longest step between two looks; at 30 km/h they are 5 m apart
 LINK_BEND_RAD = 0.35  # the chord of a link points half its turn ahead, within this

@@ -13,9 +13,9 @@ from hippodrome.core.localization import places as localizer_places
 from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.localization.places import Places
 from hippodrome.core.types import Float32Array, FloatArray, Frame, HippodromeError, IntArray
-from hippodrome.core.views import descriptors as view_cells
-from hippodrome.core.views import index as view_search
-from hippodrome.core.views.index import Found
+from hippodrome.core.views.descriptors import describe
+from hippodrome.core.views.index import ScoredViews, index_of, search
+from hippodrome.core.views.scoring import start_query_mean, update_query_mean
 
 NOWHERE: IntArray = np.zeros(0, dtype=np.int32)
 
@@ -24,7 +24,7 @@ NOWHERE: IntArray = np.zeros(0, dtype=np.int32)
 class Recognised:
     """What one look shows."""
 
-    found: Found
+    found: ScoredViews
     cell: int  # the best after filtering
     margin: float  # how far it stands out from the best elsewhere
 
@@ -45,26 +45,26 @@ class PlaceRecogniser:
         gradient, sequence = places.bank.kind == "gradient", config.sequence
         self._places, self._config = places, config
         self._spread_floor = sequence.sigma_floor if gradient else sequence.grey_sigma_floor
-        self._index = view_search.index_of(places.bank, config.search)
+        self._index = index_of(places.bank, config.search)
         self._filtered: Float32Array = np.zeros(len(places.poses_m), dtype=np.float32)
-        self._query_mean = view_cells.start_query_mean(places.bank.mean, config.mean_trust)
+        self._query_mean = start_query_mean(places.bank.mean, config.mean_trust)
 
     def look(self, frame: Frame, step_m: float, turned_rad: float, believed: IntArray = NOWHERE) -> Recognised:
         """One frame, and the motion since the last; ``believed`` cells are scored whatever the frame is like."""
         config, places = self._config, self._places
-        descriptor = view_cells.describe(frame, config.views)
-        self._query_mean = view_cells.update_query_mean(self._query_mean, descriptor, config.views)
+        descriptor = describe(frame, config.views)
+        self._query_mean = update_query_mean(self._query_mean, descriptor, config.views)
         likely = believed
         if self._index is not None:
             expected = localizer_places.expected(places, self._filtered, config.search.hypotheses)
             likely = np.concatenate([expected, believed])
         query = descriptor, self._query_mean
-        found = view_search.search(places.bank, self._index, likely, query, config.views, config.search)
+        found = search(places.bank, self._index, likely, query, config.views, config.search)
         self._filtered = self._filter(found, step_m, turned_rad)
         cell = int(np.argmax(self._filtered))
         return Recognised(found, cell, localizer_places.margin(places, self._filtered, cell))
 
-    def z_score(self, found: Found, similarity: Float32Array | float) -> Float32Array | float:
+    def z_score(self, found: ScoredViews, similarity: Float32Array | float) -> Float32Array | float:
         """How far a similarity lies above that of all places, in their standard deviations."""
         return (similarity - found.mean) / max(found.spread, self._spread_floor)
 
@@ -74,7 +74,7 @@ class PlaceRecogniser:
         similarity[seen.found.cells] = seen.found.similarity
         return localizer_places.interpolated_pose(self._places, similarity, seen.cell)
 
-    def _filter(self, found: Found, step_m: float, turned_rad: float) -> Float32Array:
+    def _filter(self, found: ScoredViews, step_m: float, turned_rad: float) -> Float32Array:
         sequence, places = self._config.sequence, self._places
         enough = len(places.poses_m) >= sequence.min_cells
         z = np.asarray(self.z_score(found, found.similarity) if enough else np.zeros_like(found.similarity), dtype=np.float32)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hippodrome.core.types import Edges, FloatArray, HippodromeError, IntArray, Observation, Trajectory, UInt8Array
-from hippodrome.core.views import keyframes as view_step
-from hippodrome.core.views.keyframes import ViewStepConfig
+from hippodrome.core.views import keyframes
+from hippodrome.core.views.keyframes import KeyframeConfig
 from hippodrome.eval.rivals.ratslam import pose_cells
 from hippodrome.eval.rivals.ratslam.experiences import ExperienceConfig, ExperienceMap
 from hippodrome.eval.rivals.ratslam.pose_cells import PoseCellConfig
@@ -27,7 +27,7 @@ class RatSlamConfig:
     pose_cells: PoseCellConfig = field(default_factory=PoseCellConfig)
     views: ViewConfig = field(default_factory=ViewConfig)
     experiences: ExperienceConfig = field(default_factory=ExperienceConfig)
-    speed: ViewStepConfig = field(default_factory=lambda: ViewStepConfig(interval_s=0.25))  # a cell: 2 m at 30 km/h
+    speed: KeyframeConfig = field(default_factory=lambda: KeyframeConfig(interval_s=0.25))  # a cell: 2 m at 30 km/h
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +53,7 @@ class RatSlam:
 
     def __init__(self, config: RatSlamConfig) -> None:
         self._config = config
-        self._speeds = view_step.start()
+        self._speeds = keyframes.start()
         self._cells = pose_cells.start(config.pose_cells)
         self._templates = ViewTemplates(config.views)
         self._map = ExperienceMap(config.experiences)
@@ -95,8 +95,8 @@ class RatSlam:
 
     def _integrate_paths(self, observation: Observation) -> None:
         length, turn_rad = observation.speed * observation.dt_s, observation.yaw_rate_radps * observation.dt_s
-        self._speeds = view_step.advance(self._speeds, observation, self._config.speed)
-        self._map.move(view_step.arc(length, turn_rad))
+        self._speeds = keyframes.advance(self._speeds, observation, self._config.speed)
+        self._map.move(keyframes.arc_motion(length, turn_rad))
         distance = length / self._speeds.spacing if self._speeds.spacing > 0.0 else 0.0
         cells = pose_cells.attract(self._cells, self._config.pose_cells)
         self._cells = pose_cells.path_integrate(cells, distance, turn_rad)

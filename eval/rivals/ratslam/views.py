@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hippodrome.core.types import FloatArray, Frame, UInt8Array
-from hippodrome.core.views import descriptors as view_cells
-from hippodrome.core.views.descriptors import Descriptor, QueryMean, ViewCellConfig
+from hippodrome.core.views.descriptors import Descriptor, ViewCellConfig, describe
+from hippodrome.core.views.scoring import QueryMean, best_over_shifts, make_bank, score
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ class ViewTemplates:
     def recognise(self, frame: Frame, code: FloatArray) -> Recognised:
         """The most similar template below the threshold, or a new one associated with the present pose ``code`` (3,)."""
         config = self._config
-        image = view_cells.describe(frame, config.template)
-        bank = view_cells.make_bank("grey", config.template.shape, self._images[: self._count], self._no_mean.mean)
+        image = describe(frame, config.template)
+        bank = make_bank("grey", config.template.shape, self._images[: self._count], self._no_mean.mean)
         shifts, best = np.zeros(0, dtype=np.int32), -1
         if self._count:
-            scores = view_cells.score(bank, image, self._no_mean, config.template)
-            similarity, shifts = view_cells.best_over_shifts(scores, config.template.max_shift)
+            scores = score(bank, image, self._no_mean, config.template)
+            similarity, shifts = best_over_shifts(scores, config.template.max_shift)
             best = int(np.argmax(similarity))
             if similarity[best] >= -255.0 * config.match_threshold:
                 return Recognised(best, False, -float(shifts[best]) * config.column_rad)

@@ -18,9 +18,9 @@ from hippodrome.core.localization import places as localizer_places
 from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.localization.recogniser import PlaceRecogniser
 from hippodrome.core.types import CognitiveMap, FloatArray, Frame, IntArray, UInt8Array
-from hippodrome.core.views import descriptors as view_cells
-from hippodrome.core.views import keyframes as view_step
-from hippodrome.core.views.descriptors import QueryMean, ViewCellConfig
+from hippodrome.core.views import keyframes
+from hippodrome.core.views.descriptors import ViewCellConfig, describe
+from hippodrome.core.views.scoring import QueryMean, make_bank, score, template_mean
 from hippodrome.core.views.sequence import SequenceConfig
 from hippodrome.sim.recording import Recording
 
@@ -63,17 +63,17 @@ class Curve:
 
 def looks_of(drive: Recording, config: LocalizerConfig) -> Looks:
     """The frames that a localizer would look at: one whenever the view has changed enough."""
-    state, poses, motions = view_step.start(), [], []
+    state, poses, motions = keyframes.start(), [], []
     frames: list[Frame] = []
     samples = drive.samples
     for i, sensed in enumerate(drive.self_motion()):
-        state = view_step.advance(state, sensed, config.steps)
+        state = keyframes.advance(state, sensed, config.steps)
         number = int(samples.frame[i])
-        if number >= 0 and (not frames or view_step.is_due(state, config.steps)):
+        if number >= 0 and (not frames or keyframes.is_due(state, config.steps)):
             frames.append(drive.frame(number))
             poses.append(samples.poses_m[i])
             motions.append((state.travelled, state.turned_rad))
-            state = view_step.restart(state)
+            state = keyframes.restart(state)
     travelled, turned_rad = np.array(motions).T
     return Looks(frames, np.array(poses), travelled, turned_rad)
 
@@ -91,7 +91,7 @@ def half_known(cognitive_map: CognitiveMap) -> CognitiveMap:
         t_s=cognitive_map.t_s[kept],
         poses=cognitive_map.poses[kept],
         view_cell=number[cognitive_map.view_cell[kept]],
-        view_cells=replace(cells, templates=templates, mean=view_cells.template_mean(cells.kind, templates)),
+        view_cells=replace(cells, templates=templates, mean=template_mean(cells.kind, templates)),
         log_scale=None if cognitive_map.log_scale is None else cognitive_map.log_scale[kept],
         covariance=None,
         road_match=None,
@@ -168,14 +168,14 @@ def _by_views(
 
 
 def _template(frame: Frame) -> UInt8Array:
-    return np.asarray(view_cells.describe(frame, RATSLAM), dtype=np.uint8)
+    return np.asarray(describe(frame, RATSLAM), dtype=np.uint8)
 
 
 def _similarity(templates: UInt8Array, query: UInt8Array) -> FloatArray:
     """Minus the smallest mean absolute difference (C,) over the shifts."""
     nothing = QueryMean(np.zeros(len(query), dtype=np.float32), 0)
-    bank = view_cells.make_bank("grey", RATSLAM.shape, templates, nothing.mean)
-    likest: FloatArray = view_cells.score(bank, query, nothing, RATSLAM).max(axis=1).astype(np.float64)
+    bank = make_bank("grey", RATSLAM.shape, templates, nothing.mean)
+    likest: FloatArray = score(bank, query, nothing, RATSLAM).max(axis=1).astype(np.float64)
     return likest
 
 

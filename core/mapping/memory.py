@@ -16,6 +16,7 @@ from hippodrome.core.types import Float32Array, ViewCells
 from hippodrome.core.views import descriptors as view_cells
 from hippodrome.core.views.descriptors import Descriptor, ViewCellBank, ViewCellConfig
 from hippodrome.core.views.graph import CellGraph
+from hippodrome.core.views.peaks import peak_of_values, peak_shift
 from hippodrome.core.views.sequence import (
     NO_EVIDENCE,
     Evidence,
@@ -136,7 +137,7 @@ class PlaceMemory:
         return found[::-1]
 
     def _recognition(self, view: _Waiting, margin: float) -> Recognition:
-        shift = _peak_offset(view.scores[view.cell])
+        shift = peak_shift(view.scores[view.cell])
         along = self._along(view)
         return Recognition(view.vertex, view.cell, margin, along, -shift * self._config.column_rad)
 
@@ -150,7 +151,7 @@ class PlaceMemory:
         before, after = int(links.source[into]), int(links.target[out_of])
         if max(before, after) >= len(best) or min(-behind, ahead) <= 0.0:
             return 0.0
-        return _parabola(behind, best[before], best[view.cell], ahead, best[after])
+        return peak_of_values(behind, best[before], best[view.cell], ahead, best[after])
 
     def _store(self, spacing: float) -> None:
         view = self._waiting.popleft()
@@ -189,21 +190,3 @@ class _ViewStore:
         newest = view_cells.make_bank(kind, shape, stored[-1:], self.bank.mean)
         inverse_norm = np.concatenate([self.bank.inverse_norm, newest.inverse_norm])
         self.bank = ViewCellBank(kind, shape, stored, self.bank.mean, inverse_norm)
-
-
-def _parabola(x_before: float, before: float, here: float, x_after: float, after: float) -> float:
-    """Where the parabola through (x_before, before), (0, here), (x_after, after) peaks, at most half way to a neighbour."""
-    slope_before, slope_after = (here - before) / -x_before, (after - here) / x_after
-    curvature = (slope_after - slope_before) / (x_after - x_before)
-    if curvature >= 0.0:
-        return 0.0
-    tangent = slope_before + curvature * -x_before  # slope at 0 of the interpolating parabola
-    return float(np.clip(-0.5 * tangent / curvature, 0.5 * x_before, 0.5 * x_after))
-
-
-def _peak_offset(scores: Float32Array) -> float:
-    """Sub-column shift (columns) at which the scores (2 n + 1,) of one cell peak."""
-    best, centre = int(np.argmax(scores)), len(scores) // 2
-    if best in (0, len(scores) - 1):
-        return float(best - centre)
-    return best - centre + _parabola(-1.0, float(scores[best - 1]), float(scores[best]), 1.0, float(scores[best + 1]))

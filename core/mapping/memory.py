@@ -21,6 +21,7 @@ from hippodrome.core.mapping.view_store import ViewStore
 from hippodrome.core.types import Float32Array, ViewCells
 from hippodrome.core.views.descriptors import Descriptor, ViewCellConfig
 from hippodrome.core.views.graph import CellGraph
+from hippodrome.core.views.peaks import peak_of_values, peak_shift
 from hippodrome.core.views.scoring import score, start_query_mean, update_query_mean
 from hippodrome.core.views.sequence import (
     NO_EVIDENCE,
@@ -161,7 +162,7 @@ class PlaceMemory:
 
     def _recognition(self, view: _PendingView, margin: float) -> Recognition:
         """The recognition of a view as its cell; a view that looks further right than the cell has its heading to the right."""
-        shift = _peak_offset(view.scores[view.cell])
+        shift = peak_shift(view.scores[view.cell])
         along = self._along(view)
         return Recognition(view.vertex, view.cell, margin, along, -shift * self._config.column_rad)
 
@@ -178,7 +179,7 @@ class PlaceMemory:
         before, after = int(links.source[into]), int(links.target[out_of])
         if max(before, after) >= len(best) or min(-behind, ahead) <= 0.0:
             return 0.0
-        return _parabola(behind, best[before], best[view.cell], ahead, best[after])
+        return peak_of_values(behind, best[before], best[view.cell], ahead, best[after])
 
     def _store_oldest(self, spacing: float) -> None:
         """Store the oldest pending view, as a cell of its own unless it was recognised, and link its cell to the one before."""
@@ -193,21 +194,3 @@ class PlaceMemory:
             self._graph.link(last, cell, view.travelled, view.turned_rad)
         self.vertex_cell.append(cell)
         self._last_cell = cell
-
-
-def _parabola(x_before: float, before: float, here: float, x_after: float, after: float) -> float:
-    """Where the parabola through (x_before, before), (0, here), (x_after, after) peaks, at most half way to a neighbour."""
-    slope_before, slope_after = (here - before) / -x_before, (after - here) / x_after
-    curvature = (slope_after - slope_before) / (x_after - x_before)
-    if curvature >= 0.0:
-        return 0.0
-    tangent = slope_before + curvature * -x_before  # slope at 0 of the interpolating parabola
-    return float(np.clip(-0.5 * tangent / curvature, 0.5 * x_before, 0.5 * x_after))
-
-
-def _peak_offset(scores: Float32Array) -> float:
-    """Sub-column shift (columns) at which the scores (2 n + 1,) of one cell peak."""
-    best, centre = int(np.argmax(scores)), len(scores) // 2
-    if best in (0, len(scores) - 1):
-        return float(best - centre)
-    return best - centre + _parabola(-1.0, float(scores[best - 1]), float(scores[best]), 1.0, float(scores[best + 1]))

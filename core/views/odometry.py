@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hippodrome.core.types import Float32Array, FloatArray, Frame, Observation
+from hippodrome.core.views.peaks import peak_in_row
 
 Grey: TypeAlias = NDArray[Any]  # (H, W) uint8
 
@@ -195,16 +196,7 @@ def estimate_step(
     best = int(np.argmax(likely))
     if agreement[best] < LEAST_CORRELATION or not possible[best]:
         return expected_m
-    return PIXEL_M * (best + _peak(agreement, best))
-
-
-def _peak(values: Float32Array, best: int) -> float:
-    """Offset of a parabola's peak through a value and its neighbours, at most half a step."""
-    if not 0 < best < len(values) - 1:
-        return 0.0
-    before, here, after = (float(value) for value in values[best - 1 : best + 2])
-    curvature = before - 2.0 * here + after
-    return 0.0 if curvature >= 0.0 else min(0.5, max(-0.5, 0.5 * (before - after) / curvature))
+    return PIXEL_M * (best + peak_in_row(agreement, best))
 
 
 def _road_from_above(image: Grey, turn_rad: float, focal_px: float, camera: CameraGeometry) -> Float32Array:

@@ -60,7 +60,9 @@ def meanings(model: type) -> dict[str, str]:
 
 @lru_cache(maxsize=256)
 def comments(model: type) -> dict[str, str]:
-    """What each field's comment says: the text after ``#`` on the lines of its declaration."""
+    """What each field's comment says: the text after ``#`` on the lines of its declaration. Inherited fields come first."""
+    parents = [parent for parent in model.__bases__ if dataclasses.is_dataclass(parent)]
+    inherited = {name: comment for parent in parents for name, comment in comments(parent).items()}
     lines, first = inspect.getsourcelines(model)
     source = inspect.cleandoc("".join(lines)) if lines[0].startswith(" ") else "".join(lines)
     words: dict[int, str] = {}
@@ -70,7 +72,7 @@ def comments(model: type) -> dict[str, str]:
     (body,) = ast.parse(source).body
     assert isinstance(body, ast.ClassDef), f"{model} at line {first}"
     fields = [node for node in body.body if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)]
-    return {
+    return inherited | {
         node.target.id: " ".join(filter(None, (words.get(line) for line in range(node.lineno, (node.end_lineno or 0) + 1))))
         for node in fields
         if isinstance(node.target, ast.Name)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
-from hippodrome.core.localization.config import VISUAL_NOISE
+from hippodrome.core.localization.beliefs.config import VISUAL_NOISE
 from hippodrome.core.types import HippodromeError
 from hippodrome.core.views.odometry import CameraGeometry
 from hippodrome.sim.scenario import Scenario

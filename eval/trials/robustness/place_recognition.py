@@ -21,7 +21,7 @@ from hippodrome.core.types import CognitiveMap, FloatArray, Frame, IntArray, UIn
 from hippodrome.core.views import keyframes
 from hippodrome.core.views.descriptors import ViewCellConfig, describe
 from hippodrome.core.views.scoring import QueryMean, make_bank, score, template_mean
-from hippodrome.core.views.sequence import SequenceConfig
+from hippodrome.core.views.sequence import SequenceConfig, Step
 from hippodrome.sim.recording import Recording
 
 MAPPED_M, MAPPED_RAD = 5.0, np.deg2rad(30.0)  # a look that has a place this near, facing the same way, can be recognised
@@ -161,9 +161,9 @@ def _by_views(
     cognitive_map: CognitiveMap, looks: Looks, log_scale: float, config: LocalizerConfig
 ) -> Iterator[tuple[int, float]]:
     """Cell and margin of each look, by the recogniser that the localizer uses."""
-    recogniser = PlaceRecogniser(localizer_places.places_of(cognitive_map, None, 0.0, config.injection.map_m), config)
+    recogniser = PlaceRecogniser(localizer_places.make_place_map(cognitive_map, None, 0.0, config.injection.map_m), config)
     for frame, travelled, turned_rad in zip(looks.frames, looks.travelled, looks.turned_rad, strict=True):
-        seen = recogniser.look(frame, float(travelled * np.exp(log_scale)), float(turned_rad))
+        seen = recogniser.recognise(frame, Step(float(travelled * np.exp(log_scale)), float(turned_rad)))
         yield seen.cell, seen.margin
 
 

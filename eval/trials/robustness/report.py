@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from hippodrome.core.localization.config import Mode
+from hippodrome.core.localization.beliefs.config import Mode
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.figures.style import ERROR_MAP, TRUTH, VERMILION, Axes, new_figure, save_figure
 from hippodrome.eval.metrics.mapped_road import MAPPED, OnMap

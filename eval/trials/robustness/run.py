@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hippodrome.core.localization.config import LocalizerConfig, Mode
+from hippodrome.core.localization.beliefs.config import Mode
+from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, HippodromeError, Observation, Trajectory
 from hippodrome.eval.methods.materials import refine_config

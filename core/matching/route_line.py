@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hippodrome.core.matching.search.route import Route
-from hippodrome.core.roads.geometry import interpolate, road_geometry
+from hippodrome.core.roads.geometry import poses_on_segments, road_geometry
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
 
@@ -50,7 +50,7 @@ def route_line(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArra
     legs, state_arc = _legs(route, network)
     lane, position, arc, points = _samples(legs)
     on_lane = lane >= 0
-    points[on_lane] = interpolate(road_geometry(network), lane[on_lane], position[on_lane])[:, :2]
+    points[on_lane] = poses_on_segments(road_geometry(network), lane[on_lane], position[on_lane])[:, :2]
     return RouteLine(arc, points, _chord_headings(points), lane, position), state_arc
 
 

@@ -15,7 +15,7 @@ from hippodrome.core.matching.search.track import (
     make_track,
     scale_range,
 )
-from hippodrome.core.roads.lane_graph import LaneGraph, bin_cells, build_lane_graph
+from hippodrome.core.roads.lane_graph import LaneGraph, bin_grid, build_lane_graph
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, Visits
 
@@ -66,8 +66,8 @@ def kernel_arguments(field: SearchField, heading_rad: FloatArray, places: FloatA
         costs.heading_sigma_rad, costs.heading_limit_nats, costs.offset_gain, 0.5 * field.bin_m, costs.length_sigma_m,
         costs.scale_step_nats, costs.scale_jump_nats, costs.lane_change_nats,
     )  # fmt: skip
-    cells = bin_cells(graph)
-    grid = graph.points_m, cells.start, cells.bin, cells.origin_m[0], cells.origin_m[1], cells.size_m, cells.columns, cells.rows
+    cells = bin_grid(graph)
+    grid = graph.points_m, cells.start, cells.bin, cells.origin_m[0], cells.origin_m[1], cells.cell_m, cells.columns, cells.rows
     off_road = off.return_nats, off.drift, off.turn_limit_rad, off.leave_nats, off.step_nats, off.spread_nats
     return KernelArguments(
         np.ascontiguousarray(heading_rad),

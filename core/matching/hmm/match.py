@@ -104,10 +104,8 @@ def _estimated_noise(
     width = np.diff(candidates.start)
     own = path - candidates.start[:-1]
     chosen = transitions.first[linked] + own[linked].astype(np.int64) * width[linked + 1] + own[linked + 1]
-    sigma_z_m, beta_m = (
-        estimate_sigma_z_m(candidates.distance_m[path[matched]]),
-        estimate_beta_m(transitions.difference_m[chosen]),
-    )
+    sigma_z_m = estimate_sigma_z_m(candidates.distance_m[path[matched]])
+    beta_m = estimate_beta_m(transitions.difference_m[chosen])
     return max(sigma_z_m, config.min_sigma_z_m), max(beta_m, config.min_beta_m)
 
 

@@ -32,7 +32,7 @@ def viterbi(
     Args:
         state_start: (T + 1,) step ``t`` owns the states ``state_start[t]:state_start[t + 1]``.
         log_emission: (K,) log emission probability of each state.
-        transition_start: (T,) the transitions from step ``t`` to ``t + 1`` are rows ``transition_start[t]:transition_start[t + 1]``.
+        transition_start: (T,) step ``t`` owns the transitions ``transition_start[t]:transition_start[t + 1]`` to ``t + 1``.
         log_transition: log transition probabilities, ordered by state of ``t``, then of ``t + 1``; -inf where there is none.
 
     Returns:

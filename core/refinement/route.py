@@ -11,16 +11,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from hippodrome.core.matching.lane_choice import beside_others, changing, choose_lanes
+from hippodrome.core.matching.confidence import ConfidenceConfig, match_breaks, match_status, reject_displaced
+from hippodrome.core.matching.lane_choice import choose_lanes, near_lane_changes, on_parallel_lanes
 from hippodrome.core.matching.route_line import RouteLine, route_line
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.route import Route, search_route
-from hippodrome.core.matching.trust import (
-    ConfidenceConfig,
-    breaks,
-    judge,
-    settled,
-)
 from hippodrome.core.refinement.solver import Solution, SolverConfig, optimise
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import (
@@ -54,17 +49,17 @@ def refine_route(
     """The topometric map, from an unknown start unless one is given."""
     visits, edges = cognitive_map.visits, closure_edges(cognitive_map)
     route = search_route(visits, network, config.search, start)
-    status = judge(route, config.confidence, edges, start is not None)[route.track.visit_samples()]
+    status = match_status(route, config.confidence, edges, start is not None)[route.track.visit_samples()]
     vouched = (status != MatchStatus.OFF_NETWORK).astype(np.float64)
     log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
     line, arc = _line(route, network)
-    free = beside_others(line, network)
+    free = on_parallel_lanes(line, network)
     solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
     if np.any(free):
         line, arc = _line(choose_lanes(solution.state.poses, vouched > 0.0, network, config.search), network)
-        log_scale, free = solution.state.log_scale, changing(line, network)
+        log_scale, free = solution.state.log_scale, near_lane_changes(line, network)
         solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
-    status = settled(status, route, solution.state.poses, config.confidence)
+    status = reject_displaced(status, route, solution.state.poses, config.confidence)
     return _refinement(cognitive_map, network, line, solution, status)
 
 
@@ -110,7 +105,7 @@ def _refinement(
         covariance=_covariance(solution.covariance[first][:, :3, :3], network, status),
         road_match=_road_match(network, line, solution.arc_m[first], status),
     )
-    return Refinement(refined, breaks(status), _estimates(solution))
+    return Refinement(refined, match_breaks(status), _estimates(solution))
 
 
 def _road_match(network: RoadNetwork, line: RouteLine, arc_m: FloatArray, status: UInt8Array) -> RoadMatch:

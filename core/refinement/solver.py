@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from hippodrome.core.matching.lane_choice import freedom_m
+from hippodrome.core.matching.lane_choice import unknown_lane_sigma_m
 from hippodrome.core.matching.projection import reproject
-from hippodrome.core.matching.route_line import BoolArray, RouteLine
+from hippodrome.core.matching.route_line import RouteLine
 from hippodrome.core.refinement.covariance import calibrated, posterior
 from hippodrome.core.refinement.noise import Noise, per_freedom, reestimated
 from hippodrome.core.refinement.residuals import (
@@ -21,6 +21,7 @@ from hippodrome.core.refinement.residuals import (
     odometry,
     road,
 )
+from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.solvers.chain import ChainFactor, marginals, solve_coupled
 from hippodrome.core.types import Edges, FloatArray, Visits
 
@@ -68,7 +69,7 @@ def optimise(
     for along_sigma_m in config.along_sigma_m:
         arc_m = reproject(line, state.poses[:, :2], arc_m, config.reprojection_m)
         points, heading = on_line(line, arc_m)
-        freedom = np.hypot(freedom_m(line, arc_m, free), config.survey_sigma_m)
+        freedom = np.hypot(unknown_lane_sigma_m(line, arc_m, free), config.survey_sigma_m)
         targets = Targets(points, heading, curvature(line, arc_m), freedom, on_road, along_sigma_m)
         for _ in range(config.inner_iterations):
             state, factor = gauss_newton_step(state, visits, edges, targets, noise, unseen)

@@ -19,7 +19,7 @@ from hippodrome.core.types import Float32Array, FloatArray, IntArray, UInt8Array
 
 _HALF_CHORD_M = 1.5  # half the chord that a bin's heading is taken over: SUMO's curves are polylines with joints 1-5 m apart
 _MAX_OPEN = 4096  # lanes still to be walked, ahead of one bin; a junction of 6 roads x 3 lanes stays below 100
-_SHORTEST_STEP_M = 1e-3  # a lane counts for at least this much, so that a ring of lanes without length ends the walk, too
+SHORTEST_STEP_M = 1e-3  # a lane counts for at least this much, so that a ring of lanes without length ends the walk, too
 
 OpenLanes: TypeAlias = NDArray[Any]  # rows of _OPEN_LANE
 _OPEN_LANE = np.dtype(
@@ -202,7 +202,7 @@ def _walk_ahead(from_bin: int, bins: _Bins, lanes: _Lanes, limit_m: float, open_
             if fill:
                 ahead.bin[count], ahead.distance_m[count], ahead.lane_changes[count] = j, distance_m, lane_changes
             count += 1
-        end_m = begin_m + max(lanes.length_m[lane], _SHORTEST_STEP_M)
+        end_m = begin_m + max(lanes.length_m[lane], SHORTEST_STEP_M)
         if end_m < limit_m:
             for e in range(lanes.successor_start[lane], lanes.successor_start[lane + 1]):
                 size = _push(open_, size, lanes.successor[e], end_m, lane_changes)

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hippodrome.core import se2
-from hippodrome.core.roads.geometry import RoadGeometry, interpolate
+from hippodrome.core.roads.geometry import RoadGeometry, poses_on_segments
 from hippodrome.core.types import FloatArray, IntArray, StartPose
 
 _ROAD_SPACING_M = 2.0  # spacing of the road samples: small against the truncation
@@ -214,7 +214,7 @@ def _sampled_roads(geometry: RoadGeometry, lever_m: float) -> _Roads:
     pieces = np.maximum(1, np.ceil(geometry.lane_length_m / _ROAD_SPACING_M).astype(np.int32))
     lane = np.repeat(np.arange(len(pieces), dtype=np.int32), pieces)
     piece = np.arange(len(lane)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    pose = interpolate(geometry, lane, (piece + 0.5) / pieces[lane] * geometry.lane_length_m[lane])
+    pose = poses_on_segments(geometry, lane, (piece + 0.5) / pieces[lane] * geometry.lane_length_m[lane])
     normal = np.column_stack([-np.sin(pose[:, 2]), np.cos(pose[:, 2])])
     return _Roads(pose[:, :2], normal, cKDTree(_lifted(pose, lever_m)))
 

@@ -12,16 +12,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from hippodrome.core.matching.lane_choice import beside_others, changing, choose_lanes
+from hippodrome.core.matching.confidence import ConfidenceConfig, match_breaks, match_status, reject_displaced
+from hippodrome.core.matching.lane_choice import choose_lanes, near_lane_changes, on_parallel_lanes
 from hippodrome.core.matching.route_line import RouteLine, route_line
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.route import Route, search_route
-from hippodrome.core.matching.trust import (
-    ConfidenceConfig,
-    breaks,
-    judge,
-    settled,
-)
 from hippodrome.core.refinement.edges import edges_where
 from hippodrome.core.refinement.solver import RouteSolution, SolverConfig, refine_along_route
 from hippodrome.core.roads.network import RoadNetwork
@@ -60,18 +55,18 @@ def refine_route(
     """
     visits, closures = cognitive_map.visits, keyframe_closures(cognitive_map)
     route = search_route(visits, network, config.search, start)
-    status = judge(route, config.confidence, closures, start is not None)[route.track.visit_samples()]
+    status = match_status(route, config.confidence, closures, start is not None)[route.track.visit_samples()]
     vouched = (status != MatchStatus.OFF_NETWORK).astype(np.float64)
     log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
     line, arc = _line_and_places(route, network)
-    free = beside_others(line, network)
+    free = on_parallel_lanes(line, network)
     solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, config.solver)
     if np.any(free):
         chosen = choose_lanes(solution.state.poses, vouched > 0.0, network, config.search)
         line, arc = _line_and_places(chosen, network)
-        log_scale, free = solution.state.log_scale, changing(line, network)
+        log_scale, free = solution.state.log_scale, near_lane_changes(line, network)
         solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, config.solver)
-    status = settled(status, route, solution.state.poses, config.confidence)
+    status = reject_displaced(status, route, solution.state.poses, config.confidence)
     return _refinement(cognitive_map, network, line, solution, status)
 
 
@@ -110,7 +105,7 @@ def _refinement(
         covariance=_covariance(solution.covariance[first][:, :3, :3], network, status),
         road_match=_road_match(network, line, solution.arc_m[first], status),
     )
-    return Refinement(refined, breaks(status), _estimates(solution))
+    return Refinement(refined, match_breaks(status), _estimates(solution))
 
 
 def _road_match(network: RoadNetwork, line: RouteLine, arc_m: FloatArray, status: UInt8Array) -> RoadMatch:

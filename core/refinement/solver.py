@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from hippodrome.core.matching.lane_choice import freedom_m
+from hippodrome.core.matching.lane_choice import unknown_lane_sigma_m
 from hippodrome.core.matching.projection import reproject
-from hippodrome.core.matching.route_line import BoolArray, RouteLine
+from hippodrome.core.matching.route_line import RouteLine
 from hippodrome.core.refinement.covariance import posterior_covariance, with_systematic_errors
 from hippodrome.core.refinement.noise import Noise, rescaled, variance_factors
 from hippodrome.core.refinement.residuals import (
@@ -21,6 +21,7 @@ from hippodrome.core.refinement.residuals import (
     normal_equations,
     stepped,
 )
+from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.solvers.chain import ChainFactor, marginals, solve_coupled
 from hippodrome.core.types import Edges, FloatArray, Visits
 
@@ -83,7 +84,7 @@ def refine_along_route(
     for along_sigma_m in config.along_sigma_m:
         arc_m = reproject(line, state.poses[:, :2], arc_m, config.reprojection_m)
         points, heading = points_on_line(line, arc_m)
-        added_lateral_m = np.hypot(freedom_m(line, arc_m, free), config.survey_sigma_m)
+        added_lateral_m = np.hypot(unknown_lane_sigma_m(line, arc_m, free), config.survey_sigma_m)
         targets = RoadTargets(points, heading, curvature(line, arc_m), added_lateral_m, road_weight, along_sigma_m)
         for _ in range(config.inner_iterations):
             state, factor = gauss_newton_step(state, visits, closures, targets, noise, scale_step_variance)

@@ -18,7 +18,7 @@ def test_alignment_by_column_and_spaced_rule():
 def test_a_row_of_another_length_is_refused():
     with pytest.raises(ValueError, match="3 cells in a table of 2 columns"):
         table(["a", "b"], [["1", "2", "3"]])
-    with pytest.raises(ValueError, match="shorter|longer"):
+    with pytest.raises(ValueError, match=r"shorter|longer"):
         table(["a", "b"], [], align="l")
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from importlib.util import find_spec
 from pathlib import Path
 from sysconfig import get_path
-from typing import Final
+from typing import Any, Final
 
 from hippodrome.sim.scenario import Scenario, load_scenario
 from hippodrome.sim.yaml_file import ScenarioError
@@ -48,6 +49,14 @@ def portable(network: Path) -> str:
         if network.is_relative_to(site):
             return f"{PACKAGE}{network.relative_to(site).as_posix()}"
     return network.name
+
+
+def effective_configuration(scenario: Scenario) -> dict[str, Any]:
+    """All values of a scenario, defaults included, as plain data for JSON. A network is named as ``portable`` does."""
+    values: dict[str, Any] = json.loads(scenario.model_dump_json())  # JSON has no infinity: such a limit becomes null
+    if scenario.town.network is not None:
+        values["town"]["network"] = portable(scenario.town.network)
+    return values
 
 
 def _package_folder(package: str) -> Path | None:

@@ -21,7 +21,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], align: str = "left
     Raises:
         ValueError: A row, or ``align``, has another number of columns than ``head``.
     """
-    letters = {"left-first": "l" + "r" * (len(head) - 1), "left": "l" * len(head)}.get(align, align)
+    letters = {"left-first": ("l" + "r" * len(head))[: len(head)], "left": "l" * len(head)}.get(align, align)
     rules = [RULES[letter] for letter, _ in zip(letters, head, strict=True)]
     lines = [_line(head).replace("|  |", "| |"), _line(rules) if spaced else f"|{'|'.join(rules)}|"]
     for row in rows:

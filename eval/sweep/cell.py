@@ -14,9 +14,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from hippodrome.core.types import Trajectory
-from hippodrome.eval.evaluate import MODES, EvaluationTask, evaluate_scenario
+from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.files.trajectories import read_tum
-from hippodrome.eval.methods.materials import file_stem, score_trajectory
+from hippodrome.eval.methods.materials import score_trajectory
+from hippodrome.eval.methods.method import method_of
 from hippodrome.eval.metrics.association import associate
 from hippodrome.eval.metrics.localization import FALSE_FIX_M
 from hippodrome.eval.metrics.trajectory import Score
@@ -120,13 +121,14 @@ def _locked(plan: RecordingPlan) -> Iterator[None]:
 
 def _samples(row: Row, evidence: Path) -> dict[str, Samples]:
     """Scored again from the trajectories that the evaluation left."""
-    path = evidence / f"{file_stem(row.method)}.tum"
+    method = method_of(row.method)
+    path = evidence / f"{method.stem}.tum"
     if row.ape is None or not path.exists():
         return {}
     truth = read_tum(evidence / "ground-truth.tum")
-    scored = score_trajectory(read_tum(path), truth, metric=row.method in dict(MODES))
+    scored = score_trajectory(read_tum(path), truth, method.alignment)
     found = {name: _kept(score) for name, score in (("ape", scored.ape), ("rpe", scored.rpe), ("rpe_20m", scored.rpe_20m))}
-    path = evidence / f"{file_stem(row.method)}-localization.tum"
+    path = evidence / f"{method.stem}-localization.tum"
     if row.localization is not None and path.exists():
         located = _localization(read_tum(path), read_tum(evidence / "localization-ground-truth.tum"), row.localization.definition)
         found |= {"localization": located} if located is not None else {}

@@ -12,6 +12,7 @@ import numpy as np
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, HippodromeError, Trajectory
 from hippodrome.eval.files.trajectories import read_tum
+from hippodrome.eval.methods.method import method_of
 from hippodrome.eval.methods.stages import dead_reckoning
 from hippodrome.proto.codec import load_map
 from hippodrome.sim.files import sha256_of
@@ -93,7 +94,7 @@ def _drive(
 
 def _frame_of(method: str) -> Literal["network", "own"]:
     """Refinement and localization answer in the network's frame, everything else in a frame of its own."""
-    return "network" if method.startswith("topometric") else "own"
+    return "network" if method_of(method).frame == "network" else "own"
 
 
 def _role_of(stem: str) -> str:

@@ -1,4 +1,4 @@
-"""Frames of other generated towns, and the vocabulary trained on them, made once and kept."""
+"""The vocabulary for ORB-SLAM3: trained on frames of other generated towns, made once and kept."""
 
 from __future__ import annotations
 
@@ -26,27 +26,28 @@ from hippodrome.sim.town import TownSpec
 from hippodrome.sim.traffic import TrafficSpec
 
 KINDS: Final[tuple[Literal["grid", "radial", "random", "rural"], ...]] = ("grid", "radial", "random", "rural")
-FIRST_SEED: Final = 770_001  # of the training towns; scenarios use small seeds, and a scenario's own town is left out
-FRAME_RATE_HZ: Final = 1.0  # a frame every 5 to 10 m: neighbours share few corners
-DRIVE_M: Final = 900.0  # about 150 frames a town
+FIRST_SEED: Final = 770_001  # of the training towns; scenarios use small seeds, and a town with the scenario's seed is left out
+FRAME_RATE_HZ: Final = 1.0  # gives a frame every 5 to 10 m, so that neighbours share few corners
+DRIVE_M: Final = 900.0  # gives about 150 frames per town
 
 
 @dataclass(frozen=True, slots=True)
 class VocabularyTask:
-    """Train for this camera, unless that is on disk already; no town with this seed is looked at."""
+    """Train a vocabulary for a camera, unless it is on disk already."""
 
     camera: CameraSpec
-    scenario_seed: int
-    root: Path
+    scenario_seed: int  # a town with this seed is not looked at
+    root: Path  # the vocabulary and its training frames live below ``root/vocabulary``
 
     @property
     def path(self) -> Path:
+        """The vocabulary's file."""
         size = f"{self.camera.width}x{self.camera.height}-{self.camera.fov_deg:g}deg{'-grain' if self.camera.grain else ''}"
         return self.root / "vocabulary" / f"orb-k{BRANCHING}-L{DEPTH}-{size}.txt"  # the tracker reads text by the suffix
 
 
 def train_vocabulary(task: VocabularyTask) -> Path:
-    """The vocabulary file."""
+    """Train the vocabulary if it is not on disk; returns its file."""
     if not task.path.exists():
         descriptors, image = orb_descriptors(_training_frames(task))
         task.path.parent.mkdir(parents=True, exist_ok=True)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
+from hippodrome.eval.methods.sequences import cut
 from hippodrome.eval.methods.stages import localize_recording
 from hippodrome.eval.metrics.localization import FALSE_FIX_M, LocalizationScore, score_localization
 from hippodrome.eval.metrics.mapped_road import (
@@ -23,7 +24,6 @@ from hippodrome.eval.metrics.mapped_road import (
 )
 from hippodrome.eval.metrics.trajectory import path_length_m
 from hippodrome.eval.results.paper_rows import SEQUENCE_LENGTH_M
-from hippodrome.eval.rivals.sequences import cut
 from hippodrome.sim.recording import Recording
 
 BEFORE_M, AFTER_M = 200.0, 200.0  # driven before a kidnapping, and after it at most
@@ -121,7 +121,7 @@ def paper_sequences(
         except HippodromeError as error:
             found.append(replace(sequence, failure=str(error)))
             continue
-        run = localize_recording(observations[first:end], cognitive_map, roads, config)
+        run = localize_recording(observations[first:end], Localizer(cognitive_map, roads, config))
         truth = Trajectory(samples.t_s[first:end], samples.poses_m[first:end])
         score = score_localization(run.estimates, truth, run.step_s)
         found.append(replace(sequence, score=score, on_map=split_by_map(score, truth.poses, cognitive_map)))

@@ -9,10 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from hippodrome.core.localization.config import LocalizerConfig, Mode
+from hippodrome.core.localization.localizer import Localizer
+from hippodrome.core.mapping.mapper import Mapper
+from hippodrome.core.refinement.refine import refine
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, HippodromeError, Observation, Trajectory
 from hippodrome.eval.methods.materials import refine_config
-from hippodrome.eval.methods.stages import localize_recording, map_recording, refine_map
+from hippodrome.eval.methods.stages import localize_recording, map_recording
 from hippodrome.eval.metrics.localization import score_localization
 from hippodrome.eval.metrics.mapped_road import split_by_map
 from hippodrome.eval.metrics.trajectory import path_length_m
@@ -125,8 +128,8 @@ def _build_map(task: tuple[Scenario, Path]) -> None:
     """The topometric map of the mapping drive, from an unknown start."""
     scenario, out = task
     recording = finish(RecordingPlan(scenario, "mapping", out))
-    semi_metric, _ = map_recording(recording.observations(), scenario.mapper)
-    refined, _ = refine_map(semi_metric, _roads(scenario, out), refine_config(scenario, "route"), None)
+    semi_metric, _ = map_recording(recording.observations(), Mapper(scenario.mapper))
+    refined = refine(semi_metric, _roads(scenario, out), refine_config(scenario, "route"), None)
     save_map(map_path(scenario, out), refined.cognitive_map, {"scenario": scenario.name, "recording": recording.folder.name})
 
 
@@ -196,7 +199,7 @@ def sequence_result(
     config: LocalizerConfig,
 ) -> SequenceResult:  # fmt: skip
     """One unknown start."""
-    run = localize_recording(observations, cognitive_map, roads, config)
+    run = localize_recording(observations, Localizer(cognitive_map, roads, config))
     score = score_localization(run.estimates, truth, run.step_s)
     confidence = np.array([estimate.confidence for estimate in run.estimates])
     on_map = split_by_map(score, truth.poses, cognitive_map)

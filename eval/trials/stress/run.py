@@ -18,6 +18,7 @@ from time import process_time
 import numpy as np
 
 import hippodrome.core.types
+from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.refinement.refine import refine
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import interpolate
@@ -131,7 +132,7 @@ def _run_case(case: StressCase, task: StressTask, maps: dict[str, CognitiveMap])
     noise = case.self_motion()
     if noise.model_dump_json() not in maps:
         sensed = sensed_anew(recording, noise, np.random.default_rng([scenario.seed, 3]))
-        maps[noise.model_dump_json()], _ = map_recording(sensed.observations(), scenario.mapper)
+        maps[noise.model_dump_json()], _ = map_recording(sensed.observations(), Mapper(scenario.mapper))
     rng = np.random.default_rng([scenario.seed, 4])
     semi_metric = with_false_closures(maps[noise.model_dump_json()], case.false_closures, rng)
     roads = town.network

@@ -7,15 +7,11 @@ import numpy as np
 import pytest
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.methods.sequences import cut
 from hippodrome.eval.results.model import LocalizationSummary
+from hippodrome.eval.results.table_two import SequenceRow, table_two_markdown, write_table_two
 from hippodrome.eval.rivals import sequences
-from hippodrome.eval.rivals.sequences import (
-    SequenceRow,
-    cut,
-    table_two,
-    table_two_markdown,
-    write_table_two,
-)
+from hippodrome.eval.rivals.sequences import localize_sequences
 
 STEPS = 2001
 STRAIGHT = SimpleNamespace(
@@ -42,7 +38,7 @@ def test_a_short_drive_is_named():
 
 def test_a_missing_map_gives_rows_that_say_so(monkeypatch, tmp_path):
     monkeypatch.setattr(sequences, "warm_up", lambda: None)
-    rows = [one.row for one in table_two(SimpleNamespace(folder=tmp_path), (100.0, 200.0))]
+    rows = [one.row for one in localize_sequences(SimpleNamespace(folder=tmp_path), (100.0, 200.0))]
     assert len(rows) == 4
     assert all("no map" in row.failure for row in rows)
     assert table_two_markdown(rows).count("FAILED") == 8  # in the table and beneath it

@@ -187,7 +187,7 @@ def _pairs(matched: Association, delta_m: float | None, pairing: Pairing) -> tup
 def _all_pairs(along_m: FloatArray, delta_m: float) -> Indices:
     """Pairs (K, 2) from every sample to the one nearest to ``delta_m`` ahead, or to the earlier of two equally near ones.
 
-    ``along_m`` (N,) is the distance travelled up to each sample. Pairs that miss the delta by more than the tolerance are no pairs.
+    ``along_m`` (N,) is the distance travelled up to each sample. Pairs that miss the delta by more than 10 % are left out.
     """
     first = np.arange(len(along_m) - 1)
     goal_m = along_m[first] + delta_m

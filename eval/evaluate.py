@@ -54,7 +54,7 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
     A method that fails has a row that says why; the other methods go on.
 
     Raises:
-        HippodromeError: No semi-metric map can be made of the mapping drive.
+        HippodromeError: No semi-metric map can be made of the mapping drive, or it cannot be scored.
     """
     warm_up()
     materials = gather(task.scenario, task.out)

@@ -100,7 +100,7 @@ def _own_frame_methods(
     ]
     for rival in run_rivals(materials, semi_metric.t_s):
         rows.append(rival.row)
-        if rival.scored is not None and rival.method != NO_ATTRACTOR:  # its poses are the semi-metric map's: they would hide
+        if rival.scored is not None and rival.method != NO_ATTRACTOR:  # its poses would cover the map's, which are the same
             scored[rival.method] = rival.scored
     return rows, scored
 

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import CognitiveMap, HippodromeError, StartPose, Trajectory
 from hippodrome.eval.figures.scenario import draw_scenario
@@ -48,7 +49,6 @@ from hippodrome.eval.results.model import (
     summarize_localization,
 )
 from hippodrome.eval.rivals.rows import NO_ATTRACTOR, Rival, rivals
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.proto.codec import save_map
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import Scenario

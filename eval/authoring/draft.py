@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 import yaml
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.files.scenarios import PACKAGE, located
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import tour_graph

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from hippodrome._files import write_atomically
 from hippodrome.eval.authoring.keys import Key, noise_keys, scenario_keys
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.self_motion import NOISE_LEVELS
 
 BEGIN: Final = "<!-- tables: made from the models by `make docs` -->"

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal
 import cv2
 import numpy as np
 
+from hippodrome._files import sha256_of, write_atomically
 from hippodrome.core.types import FloatArray, Frame, Trajectory
 from hippodrome.eval.exchange.drives.exported import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import (
@@ -25,9 +26,7 @@ from hippodrome.eval.exchange.drives.foreign import (
 from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.export import format_module, new_folder
 from hippodrome.eval.exchange.readers.tables import read_motion, read_tum_poses
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.episode import Samples
-from hippodrome.sim.files import sha256_of
 from hippodrome.sim.recording import (
     CHUNK_FRAMES,
     FORMAT,

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.results.model import (
     ErrorSummary,
@@ -17,11 +18,9 @@ from hippodrome.eval.results.model import (
     ScenarioResult,
     to_json,
 )
-from hippodrome.proto.atomic import write_atomically
+from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
 
 FORMAT: Final = 1
-# Not part of what is asked, but of how it is answered: a change there is what the gate is for.
-ANSWERS: Final = ("mapper", "refine", "localizer", "thresholds", "description")
 
 
 class GateError(HippodromeError):
@@ -39,7 +38,7 @@ class Figure(_Model):
     definition: str
 
 
-class Cell(_Model):
+class BaselineRow(_Model):
     """What one method made of one scenario with one seed."""
 
     scenario: str
@@ -59,7 +58,7 @@ class Baseline(_Model):
     """A committed file."""
 
     format: int = FORMAT
-    cells: tuple[Cell, ...]
+    cells: tuple[BaselineRow, ...]
 
 
 def baseline_of(runs: list[Results]) -> Baseline:
@@ -95,13 +94,13 @@ def read_baseline(path: Path) -> Baseline:
 def question_of(result: ScenarioResult) -> str:
     """Hash of what is asked: town, drives, camera, noise, and what came of them. Constants of the algorithms are not in it."""
     configuration: dict[str, Any] = getattr(result, "configuration", None) or {}
-    asked = {key: value for key, value in configuration.items() if key not in ANSWERS}
+    asked = {key: value for key, value in configuration.items() if key not in DRIVE_INDEPENDENT_KEYS}
     driven = [result.network.edges, round(result.network.km, 3), result.frames]  # a file's name does not say what is in it
     return hashlib.sha256(json.dumps([asked, driven], sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _cell(result: ScenarioResult, row: Row) -> Cell:
-    return Cell(
+def _cell(result: ScenarioResult, row: Row) -> BaselineRow:
+    return BaselineRow(
         scenario=result.name,
         seed=result.seed,
         question=question_of(result),

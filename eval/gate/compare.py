@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.stats import t as student_t
 
-from hippodrome.eval.gate.baseline import Baseline, Cell, GateError
+from hippodrome.eval.gate.baseline import Baseline, BaselineRow, GateError
 
 ALPHA: Final = 0.01  # chance of failing a build that is no worse, over all figures together: one in a hundred pull requests
 TOLERANCE: Final = 0.03  # a mean change below this is not worth anybody's morning, however certain
@@ -63,7 +63,7 @@ def compare(run: Baseline, baseline: Baseline) -> Verdict:
     return Verdict(tuple(changes), (*lost_cells(now, then), *_jumps(now, then, proven)))
 
 
-def require_comparable(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> None:
+def require_comparable(now: Mapping[Key, BaselineRow], then: Mapping[Key, BaselineRow]) -> None:
     """Raise GateError unless both hold the same cells, of the same scenarios and definitions."""
     if missing := sorted(set(then) - set(now)):
         raise GateError(f"the run lacks {_place(missing[0])} of the baseline; run the same scenarios and seeds, or --update")
@@ -86,7 +86,7 @@ def _place(key: Key) -> str:
 Pair = tuple[str, float, float]  # where, before, after
 
 
-def _pairs(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> dict[tuple[str, str], list[Pair]]:
+def _pairs(now: Mapping[Key, BaselineRow], then: Mapping[Key, BaselineRow]) -> dict[tuple[str, str], list[Pair]]:
     """Per method and figure: every scenario and seed in which both have it."""
     pairs: dict[tuple[str, str], list[Pair]] = {}
     for (scenario, seed, method), cell in sorted(now.items()):
@@ -128,7 +128,7 @@ def _judged(tests: Sequence[Change]) -> list[Change]:
     ]
 
 
-def lost_cells(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> list[str]:
+def lost_cells(now: Mapping[Key, BaselineRow], then: Mapping[Key, BaselineRow]) -> list[str]:
     """What no mean shows: rows that fail now and did not, drives that were localized and are not."""
     lost = []
     for key in sorted(now):
@@ -139,7 +139,7 @@ def lost_cells(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> list[str]:
     return lost
 
 
-def _jumps(now: Mapping[Key, Cell], then: Mapping[Key, Cell], proven: Collection[tuple[str, str]]) -> list[str]:
+def _jumps(now: Mapping[Key, BaselineRow], then: Mapping[Key, BaselineRow], proven: Collection[tuple[str, str]]) -> list[str]:
     """Single figures that are so much worse that no mean is needed; those whose mean fails anyway are not told twice."""
     pairs = [(key, name, then[key].figures[name].value, figure.value) for key in sorted(now)
              for name, figure in sorted(now[key].figures.items()) if name in then[key].figures]  # fmt: skip

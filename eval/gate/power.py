@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from hippodrome.eval.gate.baseline import Baseline, Cell, Figure
+from hippodrome.eval.gate.baseline import Baseline, BaselineRow, Figure
 from hippodrome.eval.gate.compare import compare
 
 REPEATS: Final = 100  # a share is known to 5 %
@@ -20,6 +20,7 @@ PLANTED: Final = (0.0, 0.05, 0.10, 0.20, 0.50)  # share by which the error is ma
 # Standard deviation of ln(error) from one harmless change to another: none, another processor's rounding, a reordered search.
 SHAKEN: Final = (0.0, 0.01, 0.03, 0.10)
 TARGET: Final = "APE mean (m)"  # the figure that is made worse
+FigureChange: TypeAlias = Callable[[BaselineRow, str, float], float]  # new value of a row's figure, from its name and value
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ def power_of(baseline: Baseline, method: str, repeats: int = REPEATS) -> list[Tr
     ]
 
 
-def shake(baseline: Baseline, change: Callable[[Cell, str, float], float]) -> Baseline:
+def shake(baseline: Baseline, change: FigureChange) -> Baseline:
     """The baseline with ``change`` applied to each figure of each cell, given its name and value."""
     return Baseline(cells=tuple(cell.model_copy(update={"figures": _changed(cell, change)}) for cell in baseline.cells))
 
@@ -67,13 +68,13 @@ def _failed_share(baseline: Baseline, method: str, planted: float, shaken: float
     return failed / repeats
 
 
-def _regression(rng: np.random.Generator, method: str, planted: float, shaken: float) -> Callable[[Cell, str, float], float]:
-    def change(cell: Cell, name: str, value: float) -> float:
+def _regression(rng: np.random.Generator, method: str, planted: float, shaken: float) -> FigureChange:
+    def change(cell: BaselineRow, name: str, value: float) -> float:
         factor = 1.0 + planted if cell.method == method and name == TARGET else 1.0
         return float(value * factor * np.exp(shaken * rng.standard_normal()))
 
     return change
 
 
-def _changed(cell: Cell, change: Callable[[Cell, str, float], float]) -> dict[str, Figure]:
+def _changed(cell: BaselineRow, change: FigureChange) -> dict[str, Figure]:
     return {name: figure.model_copy(update={"value": change(cell, name, figure.value)}) for name, figure in cell.figures.items()}

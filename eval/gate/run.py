@@ -9,13 +9,13 @@ from pathlib import Path
 
 from rich.console import Console
 
+from hippodrome._files import write_atomically
 from hippodrome.eval.gate.baseline import Baseline, GateError, baseline_of, read_baseline, write_baseline
 from hippodrome.eval.gate.compare import MIN_PAIRS, Verdict, compare
 from hippodrome.eval.gate.report import junit_xml, print_verdict, summary_markdown
 from hippodrome.eval.results.model import Results
 from hippodrome.eval.results.thresholds import failed_limits
 from hippodrome.eval.run import load_scenarios, run_scenarios
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.scenario import Thresholds
 
 SUMMARY = "GITHUB_STEP_SUMMARY"  # where GitHub Actions wants Markdown

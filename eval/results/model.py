@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.metrics.localization import LocalizationScore
 from hippodrome.eval.metrics.trajectory import Score
-from hippodrome.proto.atomic import write_atomically
 
 DECIMALS = 6  # micrometres and nanoseconds: below any meaning, above rounding noise between machines
 MAX_BYTES = 64 << 20

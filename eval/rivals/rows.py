@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.core.mapping.mapper import MapperConfig
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import AttractorStates, CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
@@ -29,7 +30,6 @@ from hippodrome.eval.methods.materials import (
 from hippodrome.eval.methods.stages import built
 from hippodrome.eval.rivals.ablation import MapperWithoutAttractor
 from hippodrome.eval.rivals.ratslam.system import RatSlam, RatSlamConfig, RatSlamMap
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.proto.codec import save_map
 
 RATSLAM, NO_ATTRACTOR = "RatSLAM", "semi-metric, no attractor"

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from pydantic import BaseModel
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import CognitiveMap, HippodromeError, LocalizationEstimate, Observation, Trajectory
 from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.eval.methods.materials import Materials, file_stem
@@ -25,7 +26,6 @@ from hippodrome.eval.results.paper_rows import (
     SEQUENCE_LENGTH_M,
     TOPOMETRIC,
 )
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.proto.codec import load_map
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import Recording

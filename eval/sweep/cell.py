@@ -22,7 +22,7 @@ from hippodrome.eval.metrics.localization import FALSE_FIX_M
 from hippodrome.eval.metrics.trajectory import Score
 from hippodrome.eval.results.model import Row, ScenarioResult
 from hippodrome.eval.sweep.executors import SweepError
-from hippodrome.eval.sweep.grid import Cell, code_sha256
+from hippodrome.eval.sweep.grid import SweepCell, cell_code_sha256
 from hippodrome.sim.record import RecordingPlan, Role, close_renderer, record
 
 ROLES: Final[tuple[Role, ...]] = ("mapping", "localization")
@@ -69,7 +69,7 @@ class RecordingTask:
 class CellTask:
     """A cell, the sweep's folder, and the code that its results are to come from."""
 
-    cell: Cell
+    cell: SweepCell
     out: Path
     code: str
 
@@ -102,9 +102,9 @@ def run_cell(task: CellTask) -> CellResult:
 
 
 def _require_same_code(code: str) -> None:
-    if code_sha256() != code:
+    if cell_code_sha256() != code:
         raise SweepError(
-            f"a worker runs other code ({code_sha256()}) than this command ({code}); install the same on all machines"
+            f"a worker runs other code ({cell_code_sha256()}) than this command ({code}); install the same on all machines"
         )
 
 

@@ -10,16 +10,16 @@ import numpy as np
 from hippodrome.eval.metrics.trajectory import pool
 from hippodrome.eval.results.model import Row, summarize
 from hippodrome.eval.sweep.cell import CellResult
-from hippodrome.eval.sweep.grid import Cell
+from hippodrome.eval.sweep.grid import SweepCell
 
 NONE = "-"
 HEAD = ("setting", "method", "runs", "failed", "APE mean (m)", "median", "p95", "max", "worst run", "RPE 20 m (m)",
         "localized", "localization mean (m)", "p95", "max", "false fixes")  # fmt: skip
 
 
-def pooled_rows(finished: Mapping[Cell, CellResult]) -> list[dict[str, Any]]:
+def pooled_rows(finished: Mapping[SweepCell, CellResult]) -> list[dict[str, Any]]:
     """Settings in the order of the grid, methods in the order of the tables."""
-    settings: dict[str, list[tuple[Cell, CellResult]]] = {}
+    settings: dict[str, list[tuple[SweepCell, CellResult]]] = {}
     for cell, result in finished.items():
         settings.setdefault(cell.label, []).append((cell, result))
     return [
@@ -29,7 +29,7 @@ def pooled_rows(finished: Mapping[Cell, CellResult]) -> list[dict[str, Any]]:
     ]
 
 
-def _pooled(label: str, method: str, cells: Sequence[tuple[Cell, CellResult]]) -> dict[str, Any]:
+def _pooled(label: str, method: str, cells: Sequence[tuple[SweepCell, CellResult]]) -> dict[str, Any]:
     rows = [(cell, row) for cell, one in cells for row in one.result.rows if row.method == method]
     samples = [one.samples[method] for _, one in cells if method in one.samples]
     pooled = {
@@ -49,7 +49,7 @@ def _pooled(label: str, method: str, cells: Sequence[tuple[Cell, CellResult]]) -
     }
 
 
-def _worst(rows: Sequence[tuple[Cell, Row]]) -> dict[str, Any] | None:
+def _worst(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, Any] | None:
     scored = [(row.ape.mean_m, cell) for cell, row in rows if row.ape is not None]
     if not scored:
         return None
@@ -57,7 +57,7 @@ def _worst(rows: Sequence[tuple[Cell, Row]]) -> dict[str, Any] | None:
     return {"cell": cell.name, "scenario": cell.scenario.name, "seed": cell.scenario.seed, "ape_mean_m": mean_m}
 
 
-def _localized(rows: Sequence[tuple[Cell, Row]]) -> dict[str, int] | None:
+def _localized(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, int] | None:
     found = [row.localization for _, row in rows if row.localization is not None]
     if not found:
         return None

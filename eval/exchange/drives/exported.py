@@ -9,12 +9,12 @@ from typing import Literal
 
 import numpy as np
 
+from hippodrome._files import sha256_of
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, HippodromeError, Trajectory
 from hippodrome.eval.files.trajectories import read_tum
 from hippodrome.eval.methods.stages import dead_reckoning
 from hippodrome.proto.codec import load_map
-from hippodrome.sim.files import sha256_of
 from hippodrome.sim.network import read_network
 from hippodrome.sim.recording import MANIFEST, Recording, open_recording
 

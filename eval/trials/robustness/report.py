@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.core.localization.config import Mode
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.figures.style import ERROR_MAP, TRUTH, VERMILION, Axes, new_figure, save_figure
@@ -28,7 +29,6 @@ from hippodrome.eval.trials.robustness.places import PlaceResult, draw_curves
 from hippodrome.eval.trials.robustness.places import markdown as places_markdown
 from hippodrome.eval.trials.robustness.targets import Target, targets
 from hippodrome.eval.trials.robustness.targets import markdown as targets_markdown
-from hippodrome.proto.atomic import write_atomically
 
 ELSEWHERE: Final = "another town"  # whatever is declared there is false
 WITHIN_M: Final = 200.0  # a start counts as a success if the localizer is right within this distance

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.eval.results.model import to_json
 from hippodrome.eval.trials.robustness.place_recognition import Answers
 from hippodrome.eval.trials.robustness.places import PlaceResult
@@ -22,7 +23,6 @@ from hippodrome.eval.trials.robustness.report import (
     yardsticks,
 )
 from hippodrome.eval.trials.robustness.targets import Target
-from hippodrome.proto.atomic import write_atomically
 
 NAME: Final = "all towns"
 DEFINITION: Final = (

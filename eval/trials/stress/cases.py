@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS, NoiseLevel, SelfMotionNoise
 from hippodrome.sim.sumo_tools import run_tool

@@ -18,6 +18,7 @@ from time import process_time
 import numpy as np
 
 import hippodrome.core.types
+from hippodrome._files import write_atomically
 from hippodrome.core.refinement.refine import refine
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import interpolate
@@ -45,7 +46,6 @@ from hippodrome.eval.trials.stress.table import (
     StressRow,
     stress_markdown,
 )
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import RecordingPlan, finish, sensed_anew
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import Scenario

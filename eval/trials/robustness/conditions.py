@@ -74,7 +74,7 @@ def _askew(offset_deg: float) -> Change:
 
 
 def _self_motion(level: str) -> Change:
-    """Self-motion with another noise level, for both drives."""
+    """Self-motion with the errors of another noise level."""
     return lambda scenario: _seen()(scenario).model_copy(update={"noise": level})
 
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from hippodrome._files import write_atomically
 from hippodrome.eval.authoring.keys import Key, noise_keys, scenario_keys
+from hippodrome.eval.results.markdown import table
 from hippodrome.sim.self_motion import NOISE_LEVELS
 
 BEGIN: Final = "<!-- tables: made from the models by `make docs` -->"
@@ -47,18 +48,19 @@ def with_tables(text: str) -> str:
 
 
 def _table(keys: Sequence[Key]) -> str:
-    lines = ["| key | takes | default | unit | meaning |", "|---|---|---|---|---|"]
-    lines += [f"| `{key.name}` | {_takes(key)} | {_default(key)} | {_unit(key.path[-1])} | {key.meaning} |" for key in keys]
-    return "\n".join(lines)
+    """One row a key, in the order of the models."""
+    rows = [[f"`{key.name}`", _takes(key), _default(key), _unit(key.path[-1]), key.meaning] for key in keys]
+    return "\n".join(table(("key", "takes", "default", "unit", "meaning"), rows, align="left"))
 
 
 def _noise_table() -> str:
     """The named levels beside one another."""
     levels = {name: level.model_dump() for name, level in NOISE_LEVELS.items()}
-    lines = [f"| key | {' | '.join(levels)} | unit | meaning |", "|---" * (len(levels) + 3) + "|"]
-    for key in noise_keys():
-        values = " | ".join(_value(level[key.path[-1]]) for level in levels.values())
-        lines.append(f"| `{key.name}` | {values} | {_unit(key.path[-1])} | {key.meaning} |")
+    rows = [
+        [f"`{key.name}`", *(_value(level[key.path[-1]]) for level in levels.values()), _unit(key.path[-1]), key.meaning]
+        for key in noise_keys()
+    ]
+    lines = table(["key", *levels, "unit", "meaning"], rows, align="left")
     words = "A level's name, or these figures; those left out have the default of `clean`."
     return f"## `noise`: errors of self-motion\n\n{words}\n\n" + "\n".join(lines) + "\n"
 

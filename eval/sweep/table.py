@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hippodrome.eval.metrics.trajectory import pool
+from hippodrome.eval.results.markdown import table
 from hippodrome.eval.results.model import Row, summarize
 from hippodrome.eval.sweep.cell import CellResult
 from hippodrome.eval.sweep.grid import SweepCell
@@ -67,8 +68,7 @@ def _localized(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, int] | None:
 
 def sweep_markdown(rows: Sequence[Mapping[str, Any]], failures: Sequence[tuple[str, str]]) -> str:
     """The table, and the cells that have no result."""
-    lines = ["# Sweep", "", f"| {' | '.join(HEAD)} |", "|---|---|" + "---:|" * (len(HEAD) - 2)]
-    lines += [f"| {' | '.join(_line(row))} |" for row in rows]
+    lines = ["# Sweep", "", *table(HEAD, map(_line, rows), align="ll" + "r" * (len(HEAD) - 2))]
     lines += ["", "Means, percentiles and maxima are over the samples of all runs together; the worst run is the one with the "
               "greatest mean.", ""]  # fmt: skip
     if failures:

@@ -11,7 +11,8 @@ import numpy as np
 
 from hippodrome._files import sha256_of
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import CognitiveMap, HippodromeError, Trajectory
+from hippodrome.core.types import CognitiveMap, Trajectory
+from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.files.trajectories import read_tum
 from hippodrome.eval.methods.stages import dead_reckoning
 from hippodrome.proto.codec import load_map
@@ -21,10 +22,6 @@ from hippodrome.sim.recording import MANIFEST, Recording, open_recording
 TRUTH = {"mapping": "ground-truth", "localization": "localization-ground-truth"}
 LOCALIZED = "-localization"  # ends the names of estimates that belong to the localization drive
 DEAD_RECKONING = "dead-reckoning"
-
-
-class ExchangeError(HippodromeError):
-    """A folder that cannot be exported, or a foreign drive that cannot be imported."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,7 @@ from mcap.reader import McapReader, make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.exchange.drives.exported import ExchangeError
+from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import (
     ForeignDrive,
     ForeignFrame,
@@ -23,12 +23,11 @@ from hippodrome.eval.exchange.drives.foreign import (
     trajectory_of,
 )
 from hippodrome.eval.exchange.drives.poses import Axes
-from hippodrome.eval.exchange.readers.raw_image import png_of
+from hippodrome.eval.exchange.readers.messages import TRUTH_TOPICS, png_of
 from hippodrome.eval.exchange.readers.spool import Spool
 
 IMAGES = ("foxglove.CompressedImage", "foxglove.RawImage")
 ODOMETRY, POSE = "foxglove.Odometry", "foxglove.PoseInFrame"
-TRUTH_TOPICS = ("/ground_truth", "/groundtruth", "/gt_pose")
 
 
 def read_mcap(path: Path, axes: Axes) -> ForeignDrive:

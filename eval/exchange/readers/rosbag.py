@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from hippodrome.core.types import Trajectory
-from hippodrome.eval.exchange.drives.exported import ExchangeError
+from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import (
     ForeignDrive,
     ForeignFrame,
@@ -21,12 +21,11 @@ from hippodrome.eval.exchange.drives.foreign import (
     trajectory_of,
 )
 from hippodrome.eval.exchange.drives.poses import Axes
-from hippodrome.eval.exchange.readers.raw_image import png_of
+from hippodrome.eval.exchange.readers.messages import TRUTH_TOPICS, png_of
 from hippodrome.eval.exchange.readers.spool import Spool
 
 COMPRESSED, RAW = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"
 ODOMETRY, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
-TRUTH_TOPICS = ("/ground_truth", "/groundtruth", "/gt_pose")
 
 
 def read_rosbag(path: Path, axes: Axes) -> ForeignDrive:

@@ -17,21 +17,21 @@ from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import TourGraph, tour_graph, toured_area
 from hippodrome.sim.town import build_town
 
-ROWS = (*(method for method, _ in MODES), SEMI_METRIC, DEAD_RECKONING)  # that limits can speak of
+ROWS = (*(method for method, _ in MODES), SEMI_METRIC, DEAD_RECKONING)  # rows of every run, of which limits can speak
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One file: all its errors, or what it describes and what is odd about it."""
+    """What was found in one file."""
 
     path: Path
-    errors: tuple[str, ...]
-    summary: str
-    notes: tuple[str, ...]
+    errors: tuple[str, ...]  # one line each; if there are any, nothing else is known
+    summary: str  # what the scenario describes, in one line
+    notes: tuple[str, ...]  # what is odd about it, and what to do
 
 
 def check_scenario(path: Path) -> Finding:
-    """Reads the file, builds or reads its town, and plans its tours; nothing is left on disk."""
+    """Read the file, build or read its town, and plan its tours. Nothing is left on disk."""
     if errors := file_errors(path):
         return Finding(path, errors, "", ())
     try:
@@ -50,7 +50,7 @@ def check_scenario(path: Path) -> Finding:
 
 
 def _tour_notes(scenario: Scenario, graph: TourGraph) -> Iterator[str]:
-    """How much of the drivable roads the mapping tour can see at most."""
+    """A note if the mapping tour can see less than half of the drivable roads."""
     tour = scenario.mapping.tour
     share = (1.0 - tour.revisit_share) * tour.planned_length_m() / float(graph.length_m.sum())
     if share < 0.5:
@@ -58,6 +58,6 @@ def _tour_notes(scenario: Scenario, graph: TourGraph) -> Iterator[str]:
 
 
 def _limit_notes(scenario: Scenario) -> Iterator[str]:
-    """Limits that speak of a row that `hippodrome eval` does not write always fail."""
+    """A note if the limits speak of a row that `hippodrome eval` does not write: they would always fail."""
     if scenario.thresholds.method not in ROWS:
         yield f"thresholds.method '{scenario.thresholds.method}' is none of the rows of every run: {', '.join(ROWS)}"

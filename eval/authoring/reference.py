@@ -14,7 +14,7 @@ from hippodrome.sim.self_motion import NOISE_LEVELS
 
 BEGIN: Final = "<!-- tables: made from the models by `make docs` -->"
 END: Final = "<!-- end of tables -->"
-UNITS: Final = {
+UNITS: Final = {  # units by the ends of fields' names, longer ends first
     "nats_per_rad": "nats/rad",
     "deg_per_sqrt_s": "deg/√s", "rad_per_sqrt_s": "rad/√s", "per_sqrt_s": "1/√s", "per_sqrt_m": "1/√m", "per_metre": "1/m",
     "mps2": "m/s²", "radps": "rad/s", "degps": "deg/s", "mps": "m/s", "km": "km", "deg": "deg", "rad": "rad", "hz": "Hz",
@@ -41,7 +41,7 @@ def reference_markdown() -> str:
 
 
 def with_tables(text: str) -> str:
-    """A document with the part between the two marks made anew."""
+    """A document with the part between ``BEGIN`` and ``END`` made anew."""
     before, rest = text.split(BEGIN, maxsplit=1)
     _, after = rest.split(END, maxsplit=1)
     return f"{before}{BEGIN}\n\n{reference_markdown()}\n{END}{after}"
@@ -54,7 +54,7 @@ def _table(keys: Sequence[Key]) -> str:
 
 
 def _noise_table() -> str:
-    """The named levels beside one another."""
+    """One row a key, one column a named level."""
     levels = {name: level.model_dump() for name, level in NOISE_LEVELS.items()}
     rows = [
         [f"`{key.name}`", *(_value(level[key.path[-1]]) for level in levels.values()), _unit(key.path[-1]), key.meaning]
@@ -74,6 +74,7 @@ def _takes(key: Key) -> str:
 
 
 def _value(value: Any) -> str:
+    """A value as people write it in YAML."""
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -86,6 +87,7 @@ def _value(value: Any) -> str:
 
 
 def _unit(name: str) -> str:
+    """The unit that a field's name ends with; empty if it has none."""
     return next((unit for ending, unit in UNITS.items() if name.endswith(f"_{ending}")), "")
 
 

@@ -15,7 +15,7 @@ from rich.table import Table
 from hippodrome.eval.gate.baseline import Baseline, BaselineRow, Figure
 from hippodrome.eval.gate.compare import compare
 
-REPEATS: Final = 100  # a share is known to 5 %
+REPEATS: Final = 100  # repeats of each trial: its share of failed builds is then known to 5 %
 PLANTED: Final = (0.0, 0.05, 0.10, 0.20, 0.50)  # share by which the error is made worse
 # Standard deviation of ln(error) from one harmless change to another: none, another processor's rounding, a reordered search.
 SHAKEN: Final = (0.0, 0.01, 0.03, 0.10)
@@ -27,9 +27,9 @@ FigureChange: TypeAlias = Callable[[BaselineRow, str, float], float]  # new valu
 class Trial:
     """How often the gate failed a change that shakes all figures and makes one figure of one method worse."""
 
-    planted: float
-    shaken: float
-    failed: float  # share of the repeats
+    planted: float  # share by which the figure's error is made worse
+    shaken: float  # standard deviation of ln(error) by which all figures are shaken
+    failed: float  # share of the repeats in which the gate failed
 
 
 def power_of(baseline: Baseline, method: str, repeats: int = REPEATS) -> list[Trial]:
@@ -41,7 +41,7 @@ def power_of(baseline: Baseline, method: str, repeats: int = REPEATS) -> list[Tr
 
 
 def shake(baseline: Baseline, change: FigureChange) -> Baseline:
-    """The baseline with ``change`` applied to each figure of each cell, given its name and value."""
+    """The baseline with each figure of each row replaced by what ``change`` answers to it."""
     return Baseline(cells=tuple(cell.model_copy(update={"figures": _changed(cell, change)}) for cell in baseline.cells))
 
 
@@ -59,6 +59,7 @@ def print_power(baseline: Baseline, method: str, console: Console) -> None:
 
 
 def _failed_share(baseline: Baseline, method: str, planted: float, shaken: float, repeats: int) -> float:
+    """Share of the repeats in which the gate fails the baseline made worse and shaken, held against itself."""
     if shaken == 0.0:
         repeats = 1  # nothing differs from one repeat to the next
     failed = 0
@@ -69,6 +70,8 @@ def _failed_share(baseline: Baseline, method: str, planted: float, shaken: float
 
 
 def _regression(rng: np.random.Generator, method: str, planted: float, shaken: float) -> FigureChange:
+    """A change that makes one figure of one method worse and shakes all figures at random."""
+
     def change(cell: BaselineRow, name: str, value: float) -> float:
         factor = 1.0 + planted if cell.method == method and name == TARGET else 1.0
         return float(value * factor * np.exp(shaken * rng.standard_normal()))

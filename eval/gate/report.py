@@ -13,8 +13,8 @@ from hippodrome.eval.gate.compare import Change, Verdict
 from hippodrome.eval.results.markdown import escaped
 from hippodrome.eval.results.markdown import table as markdown_table
 
-SHOWN = 12  # reasons on the terminal: who broke everything needs no list of it
-MOVED = 0.005  # half a per cent: below, a figure stands still
+SHOWN = 12  # reasons shown on the terminal: who broke everything needs no list of it
+MOVED = 0.005  # a figure that changes by less than this share stands still
 
 
 def print_verdict(verdict: Verdict, limits: Sequence[str], console: Console) -> None:
@@ -82,11 +82,13 @@ def junit_xml(verdict: Verdict, limits: Sequence[str]) -> bytes:
 
 
 def _cells(change: Change) -> tuple[str, ...]:
+    """The cells below ``HEADS``."""
     return (change.method, change.figure, f"{change.before:.3g}", f"{change.after:.3g}", _percent(change),
             f"{change.p_worse:.2g}", _word(change), change.worst)  # fmt: skip
 
 
 def _word(change: Change) -> str:
+    """The verdict in a word; only WORSE fails the build."""
     if change.regressed:
         return "WORSE"
     if abs(change.ratio - 1.0) <= MOVED:
@@ -95,9 +97,10 @@ def _word(change: Change) -> str:
 
 
 def _percent(change: Change) -> str:
+    """The change in per cent or, where it is many times over, as a factor."""
     return f"{100.0 * (change.ratio - 1.0):+.1f} %" if change.ratio < 10.0 else f"x {change.ratio:.0f}"
 
 
 def _xml(text: str) -> str:
-    """Without the control characters that XML cannot hold."""
+    """Text without the control characters that XML cannot hold."""
     return "".join(character if character.isprintable() else " " for character in text)

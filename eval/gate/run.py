@@ -28,14 +28,17 @@ class Request:
     scenarios: Sequence[Path]
     seeds: Sequence[int]
     baseline: Path
-    update: bool
+    update: bool  # make the run the baseline instead of comparing with it
     workers: int
     out: Path
-    junit: Path | None
+    junit: Path | None  # where the verdict goes as JUnit XML too
 
 
 def gate(request: Request) -> bool:
-    """Whether the run is as good as the baseline and within all limits; with ``update`` it becomes the baseline."""
+    """Run the scenarios with all seeds; whether the run is as good as the baseline and within all limits.
+
+    With ``update`` the run becomes the baseline, and passes. Raises HippodromeError on bad input.
+    """
     if not request.scenarios:
         raise GateError("no scenario: name one or more files")
     if len(request.scenarios) * len(request.seeds) < MIN_PAIRS:
@@ -77,7 +80,7 @@ def say(verdict: Verdict, limits: Sequence[str], junit: Path | None) -> bool:
 
 
 def broken_limits(runs: Sequence[Results]) -> list[str]:
-    """The scenarios' own limits that do not hold."""
+    """The scenarios' own limits that do not hold, in words."""
     return [
         f"{result.name}, seed {result.seed}: {line}"
         for run in runs

@@ -20,7 +20,7 @@ from hippodrome.sim.renamed import present_key
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS
 
-MAX_CELLS = 100_000  # a slip of the keyboard, not a sweep
+MAX_CELLS = 100_000  # more is taken for a slip of the keyboard
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +49,13 @@ class SweepCell:
 
     @property
     def key(self) -> str:
-        """Folder of the cell: of its scenario, effective configuration and code, so that nothing stale is taken for finished."""
+        """Name of the cell's folder, made of its whole configuration and of the code: nothing stale is taken for finished."""
         text = json.dumps([self.scenario.model_dump_json(), cell_code_sha256()])
         return f"{self.scenario.name}-{self.scenario.seed}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
 
 
 def parse_parameter(text: str) -> Parameter:
-    """``KEY=V1,V2``; values as YAML. Raises ValueError."""
+    """The parameter of ``KEY=V1,V2``, values as YAML. Raises ValueError if the text is not of that form."""
     key, equals, values = text.partition("=")
     try:
         found = yaml.safe_load(f"[{values}]")
@@ -67,7 +67,16 @@ def parse_parameter(text: str) -> Parameter:
 
 
 def make_grid(paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Sequence[Parameter]) -> list[SweepCell]:
-    """All cells, in the order given. Raises HippodromeError on what is no scenario, and on cells that are twice there."""
+    """All cells of the grid, the last parameter's values changing fastest.
+
+    Args:
+        paths: The scenarios' files.
+        seeds: Seeds that replace the scenarios' own; None: their own.
+        parameters: Keys and the values that they take in turn.
+
+    Raises:
+        HippodromeError: A file is no scenario, a key or value cannot be set, a cell is there twice, or there are too many.
+    """
     count = len(paths) * len(seeds or [0])
     for parameter in parameters:
         count *= len(parameter.values)
@@ -83,7 +92,7 @@ def make_grid(paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Se
 
 
 def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
-    """The scenario with one key replaced, checked as if it stood in the file."""
+    """The scenario with one key replaced, checked as if it stood in the file. Raises SweepError that names the key."""
     values = scenario.model_dump()
     *parents, last = present_key(key).split(".")
     place: Any = values
@@ -108,6 +117,7 @@ def cell_code_sha256() -> str:
 
 
 def _cells(scenario: Scenario, parameters: Sequence[Parameter]) -> Iterator[SweepCell]:
+    """The cells of one scenario and seed: all combinations of values."""
     for values in product(*(parameter.values for parameter in parameters)):
         chosen: Mapping[str, Any] = dict(zip((parameter.key for parameter in parameters), values, strict=True))
         changed = scenario

@@ -31,7 +31,19 @@ def sweep(
     scheduler: str | None,
     out: Path,
 ) -> bool:
-    """Run what is not finished, then merge; whether every cell has a result. Raises HippodromeError on bad input."""
+    """Run the cells that are not finished, then merge all; whether every cell has a result.
+
+    Args:
+        paths: The scenarios' files.
+        seeds: Seeds that replace the scenarios' own; None: their own.
+        parameters: Keys and the values that they take in turn.
+        workers: How many processes of this machine to use.
+        scheduler: Address of a Dask cluster's scheduler to run on instead; None: run here.
+        out: Folder for the merged results, the cells, and the recordings that they share.
+
+    Raises:
+        HippodromeError: Bad input, or nobody answers at the scheduler's address.
+    """
     out = out.resolve()  # a cluster's workers have a working directory of their own
     cells = make_grid(paths, seeds, parameters)
     if scheduler is None:
@@ -62,13 +74,13 @@ def sweep(
 
 
 def _recordings(cells: Sequence[SweepCell], out: Path) -> list[RecordingTask]:
-    """Each drive once, however many cells it serves."""
+    """One task for each drive, however many cells it serves."""
     plans = dict.fromkeys(RecordingPlan(_driven(cell), role, out) for cell in cells for role in ROLES)
     return [RecordingTask(plan, cell_code_sha256()) for plan in plans]
 
 
 def _driven(cell: SweepCell) -> Any:
-    """The scenario with whatever no drive depends on as it is by default: cells that differ in these share recordings."""
+    """The scenario with defaults for all that no drive depends on: cells that differ only in these share their recordings."""
     fields = type(cell.scenario).model_fields
     return cell.scenario.model_copy(update={name: fields[name].default for name in DRIVE_INDEPENDENT_KEYS})
 
@@ -105,5 +117,6 @@ def _merge(cells: Sequence[SweepCell], finished: dict[SweepCell, CellResult], fa
 
 
 def _named(cell: SweepCell, found: CellResult) -> Any:
+    """The cell's result, named with its setting."""
     name = f"{found.result.name} ({cell.label})" if cell.parameters else found.result.name
     return found.result.model_copy(update={"name": name, "parameters": found.parameters})

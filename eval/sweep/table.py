@@ -13,13 +13,13 @@ from hippodrome.eval.results.model import Row, summarize
 from hippodrome.eval.sweep.cell import CellResult
 from hippodrome.eval.sweep.grid import SweepCell
 
-NONE = "-"
+NONE = "-"  # what stands for a figure that there is not
 HEAD = ("setting", "method", "runs", "failed", "APE mean (m)", "median", "p95", "max", "worst run", "RPE 20 m (m)",
         "localized", "localization mean (m)", "p95", "max", "false fixes")  # fmt: skip
 
 
 def pooled_rows(finished: Mapping[SweepCell, CellResult]) -> list[dict[str, Any]]:
-    """Settings in the order of the grid, methods in the order of the tables."""
+    """One row of figures for each setting and method, as plain data: settings in the order of the grid, methods of the tables."""
     settings: dict[str, list[tuple[SweepCell, CellResult]]] = {}
     for cell, result in finished.items():
         settings.setdefault(cell.label, []).append((cell, result))
@@ -31,6 +31,7 @@ def pooled_rows(finished: Mapping[SweepCell, CellResult]) -> list[dict[str, Any]
 
 
 def _pooled(label: str, method: str, cells: Sequence[tuple[SweepCell, CellResult]]) -> dict[str, Any]:
+    """One method's figures under one setting, over the samples of all cells of that setting."""
     rows = [(cell, row) for cell, one in cells for row in one.result.rows if row.method == method]
     samples = [one.samples[method] for _, one in cells if method in one.samples]
     pooled = {
@@ -51,6 +52,7 @@ def _pooled(label: str, method: str, cells: Sequence[tuple[SweepCell, CellResult
 
 
 def _worst(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, Any] | None:
+    """The cell with the greatest mean APE; None if none was scored."""
     scored = [(row.ape.mean_m, cell) for cell, row in rows if row.ape is not None]
     if not scored:
         return None
@@ -59,6 +61,7 @@ def _worst(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, Any] | None:
 
 
 def _localized(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, int] | None:
+    """In how many cells the method localized the second drive; None if it does not localize."""
     found = [row.localization for _, row in rows if row.localization is not None]
     if not found:
         return None
@@ -78,6 +81,7 @@ def sweep_markdown(rows: Sequence[Mapping[str, Any]], failures: Sequence[tuple[s
 
 
 def _line(row: Mapping[str, Any]) -> list[str]:
+    """The cells below ``HEAD``."""
     ape, worst, localized = row.get("ape"), row["worst"], row["localized"]
     located = row.get("localization")
     return [

@@ -26,7 +26,7 @@ CONVENTIONS = (
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
-    """Two archives for each drive and method."""
+    """Write two archives for each drive and method. Raises ExchangeError if no drive has a truth."""
     if not any(drive.truth is not None for drive in drives):
         raise ExchangeError("no drive has a truth: evo has nothing to compare with")
     for drive in drives:

@@ -28,14 +28,14 @@ EUROC_TRUTH = Path("state_groundtruth_estimate0", "data.csv")
 
 
 def read_tum_folder(folder: Path, axes: Axes) -> ForeignDrive:
-    """``rgb.txt`` with its images, ``groundtruth.txt`` and ``odometry.csv`` where they exist."""
+    """Read a folder of the TUM layout: ``rgb.txt`` and its images; ``groundtruth.txt`` and ``odometry.csv`` where they exist."""
     frames = _listed(folder / "rgb.txt", None, 1.0, folder)
     truth = read_tum_poses(folder / "groundtruth.txt", axes) if (folder / "groundtruth.txt").exists() else None
     return ForeignDrive(frames, _odometry(folder / ODOMETRY), truth, None)
 
 
 def read_kitti_sequence(folder: Path, axes: Axes) -> ForeignDrive:
-    """``sequences/NN``: ``times.txt``, ``image_2`` or ``image_0``; the truth is ``../../poses/NN.txt``."""
+    """Read a folder ``sequences/NN``: ``times.txt``, ``image_2`` or ``image_0``; the truth is ``../../poses/NN.txt``."""
     t_s = read_table(folder / "times.txt", 1)[:, 0]
     images = next((folder / name for name in ("image_2", "image_0") if (folder / name).is_dir()), None)
     if images is None:
@@ -49,7 +49,7 @@ def read_kitti_sequence(folder: Path, axes: Axes) -> ForeignDrive:
 
 
 def read_euroc_folder(folder: Path, axes: Axes) -> ForeignDrive:
-    """``mav0/cam0``, ``mav0/state_groundtruth_estimate0`` and ``mav0/odometry0`` where they exist."""
+    """Read a EuRoC folder: ``mav0/cam0``; ``mav0/state_groundtruth_estimate0`` and ``mav0/odometry0`` where they exist."""
     root = folder / "mav0" if (folder / "mav0").is_dir() else folder
     frames = _listed(root / "cam0" / "data.csv", ",", 1e-9, root / "cam0" / "data")
     motion, truth = None, None

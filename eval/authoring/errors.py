@@ -44,7 +44,7 @@ def _invalid(root: yaml.Node | None, error: ValidationError) -> Iterator[tuple[i
         if isinstance(node, yaml.MappingNode) and one["type"] == "literal_error":
             continue  # a mapping was never meant to be one of the names: its own errors follow
         if one["type"] in MODEL_TYPES and place == "noise":
-            continue  # and a name was never meant to be a mapping
+            continue  # a name was never meant to be a mapping: the error about names follows
         yield line, f"{place}: {_reason(one, place)}".removeprefix(": ")
 
 

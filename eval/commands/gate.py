@@ -76,13 +76,13 @@ def _gate(options: argparse.Namespace) -> int:
 
     from hippodrome.eval.gate.baseline import read_baseline
     from hippodrome.eval.gate.power import print_power
-    from hippodrome.eval.gate.run import Request, gate
+    from hippodrome.eval.gate.run import GateRequest, gate
 
     if options.power is not None:
         print_power(read_baseline(options.baseline), options.power, Console())
         return DONE
     names = ("scenarios", "seeds", "baseline", "update", "workers", "out", "junit")
-    return DONE if gate(Request(**{name: getattr(options, name) for name in names})) else THRESHOLD_FAILED
+    return DONE if gate(GateRequest(**{name: getattr(options, name) for name in names})) else THRESHOLD_FAILED
 
 
 def _compare(options: argparse.Namespace) -> int:

@@ -9,12 +9,12 @@ from typing import Any
 from hippodrome.eval.commands.arguments import DONE, add_command, add_out, add_workers, localizer_mode, positive, seed
 
 # Names for --help, which does not wait for the parts that they come from: the tests hold them together.
-MODES = ("coupled", "kalman", "lanes", "paper")  # of ``core.localization.config.Mode``
-CASES = (  # of ``eval.trials.stress.cases.CASES``
+MODES = ("coupled", "kalman", "lanes", "paper")  # those of ``core.localization.config.Mode``
+CASES = (  # those of ``eval.trials.stress.cases.CASES``
     "paper", "no false closures", "false closures 5 %", "false closures 20 %", "survey error 0.5 m", "scale jumps 10 %",
     "drift x 3", "missing roads", "realistic", "harsh", "another town", "self-similar grid", "self-similar grid, start given",
 )  # fmt: skip
-CONDITIONS = (  # of ``eval.trials.robustness.conditions.CONDITIONS``
+CONDITIONS = (  # those of ``eval.trials.robustness.conditions.CONDITIONS``
     "same", "sun-opposite", "overcast", "dusk", "fog-80m", "sun-opposite-fog-80m", "winter", "traffic-0", "traffic-30",
     "camera-noise", "exposure", "blur", "wander-0.5m", "yaw-5deg", "self-motion-clean", "self-motion-realistic",
     "self-motion-harsh", "self-motion-visual",
@@ -128,11 +128,18 @@ def _stress(options: argparse.Namespace) -> int:
 
 
 def _robustness(options: argparse.Namespace) -> int:
-    from hippodrome.eval.trials.robustness.run import Request, robustness
+    from hippodrome.eval.trials.robustness.run import RobustnessRequest, robustness
 
-    modes = list(dict.fromkeys(["coupled", *options.modes]))
     robustness(
-        Request(options.scenarios, options.conditions, options.sequences, options.start, modes, options.workers, options.out)
+        RobustnessRequest(
+            scenarios=options.scenarios,
+            conditions=options.conditions,
+            sequences=options.sequences,
+            only=options.start,
+            modes=list(dict.fromkeys(["coupled", *options.modes])),
+            workers=options.workers,
+            out=options.out,
+        )
     )
     return DONE
 

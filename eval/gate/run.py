@@ -22,7 +22,7 @@ SUMMARY = "GITHUB_STEP_SUMMARY"  # where GitHub Actions wants Markdown
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class GateRequest:
     """What the command line asks for."""
 
     scenarios: Sequence[Path]
@@ -34,7 +34,7 @@ class Request:
     junit: Path | None  # where the verdict goes as JUnit XML too
 
 
-def gate(request: Request) -> bool:
+def gate(request: GateRequest) -> bool:
     """Run the scenarios with all seeds; whether the run is as good as the baseline and within all limits.
 
     With ``update`` the run becomes the baseline, and passes. Raises HippodromeError on bad input.
@@ -89,6 +89,6 @@ def broken_limits(runs: Sequence[Results]) -> list[str]:
     ]
 
 
-def _run(request: Request, seed: int) -> Results:
+def _run(request: GateRequest, seed: int) -> Results:
     """One seed; recordings that are there already are not made again, everything after them is."""
     return run_scenarios(load_scenarios(request.scenarios, None, seed), request.workers, request.out / f"seed-{seed}")

@@ -30,7 +30,7 @@ CONVENTIONS = (
 )
 IMAGE, ODOMETRY, TRUTH = "/camera/image/compressed", "/odometry", "/ground_truth"
 ROS = get_typestore(Stores.ROS2_HUMBLE)
-FORMAT_VERSION: Final = 8  # of the bag's metadata, what ROS 2 Humble and later read
+FORMAT_VERSION: Final = 8  # version of the bag's metadata that ROS 2 Humble and later read
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:

@@ -33,7 +33,7 @@ DEFINITION: Final = (
 class Kidnapping:
     """What came of one jump. Metres are of mapped road, counted from the jump."""
 
-    recovered_after_m: float | None  # until declared localized and within ``FALSE_FIX_M`` of the truth; None: not within AFTER_M
+    recovered_after_m: float | None  # way until declared localized within ``FALSE_FIX_M`` of the truth; None: not in ``AFTER_M``
     wrong_until_m: float  # the last metre at which the old place was still declared
 
 

@@ -43,7 +43,7 @@ ELSEWHERE_SEED: Final = 1_000  # added to the scenario's seed: another town of t
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class RobustnessRequest:
     """What the command line asks for."""
 
     scenarios: Sequence[Path]
@@ -68,7 +68,7 @@ class ConditionTask:
     mode: Mode = MAIN_MODE
 
 
-def robustness(request: Request) -> None:
+def robustness(request: RobustnessRequest) -> None:
     """Write the robustness trial of each town and, if there are several, of all together. Raises HippodromeError on bad input."""
     scenarios = load_scenarios(request.scenarios, None, None)
     conditions = chosen(request.conditions)
@@ -81,7 +81,7 @@ def robustness(request: Request) -> None:
         report_towns(request.out, towns)
 
 
-def _town(scenario: Scenario, conditions: Sequence[str], request: Request, pool: Workers) -> Findings | None:
+def _town(scenario: Scenario, conditions: Sequence[str], request: RobustnessRequest, pool: Workers) -> Findings | None:
     """Record, map once, localize under each condition, report. None if only one start was asked for, which is printed."""
     out, wanted = request.out, (request.out, request.sequences, request.only)
     tasks = [ConditionTask(name, CONDITIONS[name](scenario), scenario, *wanted) for name in conditions]

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.files.scenarios import read_scenario
@@ -22,7 +23,6 @@ from hippodrome.eval.results.model import Results, write_results
 from hippodrome.eval.results.paper_rows import quoted_rows
 from hippodrome.eval.results.tables import print_table_one, table_one_markdown
 from hippodrome.eval.results.thresholds import failed_limits
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import ROLES, RecordingPlan, finish, prepare, render_chunk
 from hippodrome.sim.recording import CHUNK_FRAMES
 from hippodrome.sim.render.probe import require_gl

@@ -14,8 +14,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from hippodrome._files import write_atomically
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.proto.atomic import write_atomically
 
 Axes: TypeAlias = Any  # matplotlib ships no types
 

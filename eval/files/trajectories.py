@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.metrics.association import TrajectoryError, check_trajectory
-from hippodrome.proto.atomic import write_atomically
 
 MAX_BYTES = 256 << 20  # about two million poses
 COLUMNS = 8

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.figures.style import BLUE, ERROR_MAP, ROAD, TRUTH, Axes, new_figure, save_figure
 from hippodrome.eval.methods.method import SEMI_METRIC, TOPOMETRIC
@@ -26,7 +27,6 @@ from hippodrome.eval.results.tables import (
     Column,
     row_cells,
 )
-from hippodrome.proto.atomic import write_atomically
 
 SHOWN: Final = (SEMI_METRIC.label, TOPOMETRIC.label)
 COLOUR_RANGE_M: Final = (0.05, 5.0)  # of the errors, from a tyre's width to a car's length

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from shapely import LineString
 
+from hippodrome._files import write_atomically
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.methods.materials import Materials, ScoredTrajectory, TopometricResult
@@ -20,7 +21,6 @@ from hippodrome.eval.methods.method import Method
 from hippodrome.eval.metrics.alignment import apply_to_positions, find_alignment
 from hippodrome.eval.metrics.association import associate
 from hippodrome.eval.results.model import MAX_BYTES, ResultsError
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.recording import Recording
 
 MAP_JSON: Final = "map.json"

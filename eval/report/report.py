@@ -6,13 +6,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
+from hippodrome._files import write_atomically
 from hippodrome.eval.report.files import read_scenario_files
 from hippodrome.eval.report.markup import Html, element, joined
 from hippodrome.eval.report.sections import scenario_section
 from hippodrome.eval.report.tables import anchor, overview
 from hippodrome.eval.results.model import Results, read_results
 from hippodrome.eval.results.paper_rows import quoted_rows
-from hippodrome.proto.atomic import write_atomically
 
 REPORT: Final = "report.html"
 # The page asks no server for anything: pictures, style and script are in the file itself.

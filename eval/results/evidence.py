@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
+from hippodrome._files import write_atomically
 from hippodrome.eval.files.scenarios import effective_configuration
 from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.eval.methods.materials import Materials, ScoredTrajectory, TopometricResult
 from hippodrome.eval.methods.method import Method
-from hippodrome.proto.atomic import write_atomically
 
 
 def write_trajectories(

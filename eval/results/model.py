@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.metrics.localization import LocalizationScore
 from hippodrome.eval.metrics.trajectory import Score
-from hippodrome.proto.atomic import write_atomically
 
 DECIMALS: Final = 6  # of every number: finer than any figure means, coarser than the rounding in which machines differ
 MAX_BYTES: Final = 64 << 20  # of a file that is read: far more than any run writes

@@ -9,6 +9,7 @@ from typing import Final
 
 from pydantic import BaseModel
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import Trajectory
 from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.eval.methods.method import method_of
@@ -16,7 +17,6 @@ from hippodrome.eval.metrics.localization import LocalizationScore
 from hippodrome.eval.results import markdown
 from hippodrome.eval.results.model import LocalizationSummary, summarize_localization, to_json
 from hippodrome.eval.results.paper_rows import INITIAL_TIME_MS, LOCALIZATION_ERROR_M, ORB_SLAM3, SEQUENCE_LENGTH_M, TOPOMETRIC
-from hippodrome.proto.atomic import write_atomically
 
 TABLE_TWO: Final = "table2.json"
 HEAD: Final = (

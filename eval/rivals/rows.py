@@ -16,6 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.core.mapping.mapper import MapperConfig
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import AttractorStates, CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
@@ -27,7 +28,6 @@ from hippodrome.eval.results.model import Row
 from hippodrome.eval.results.rows import map_size, own_frame_row
 from hippodrome.eval.rivals.ablation import MapperWithoutAttractor
 from hippodrome.eval.rivals.ratslam.system import RatSlam, RatSlamConfig, RatSlamMap
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.proto.codec import save_map
 
 RATSLAM_LONGEST_S: Final = 3_600.0  # the paper's drive of 1,315 s takes RatSLAM a minute of CPU, so this takes some seven

@@ -15,9 +15,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from hippodrome._files import replacing
 from hippodrome.core.types import Frame, HippodromeError, Trajectory
 from hippodrome.sim.episode import Samples
-from hippodrome.sim.files import replacing
 from hippodrome.sim.record import RecordingPlan, draw_chunk
 from hippodrome.sim.recording import CHUNK_FRAMES, read_samples
 from hippodrome.sim.render.camera import CameraSpec

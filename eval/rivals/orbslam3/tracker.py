@@ -19,11 +19,11 @@ from typing import IO
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
 from hippodrome.eval.rivals.orbslam3.pairs import StereoDrive
 from hippodrome.eval.rivals.orbslam3.poses import read_camera_tum
 from hippodrome.eval.rivals.orbslam3.settings import ATLAS, settings_text
-from hippodrome.proto.atomic import write_atomically
 
 RUNNER = Path(__file__).with_name("runner.py")
 # Time that a run may take: so much, and so much per frame. A frame takes 0.07 s on a free core, so ten times that is a hang.

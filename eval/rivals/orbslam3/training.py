@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import Frame
 from hippodrome.eval.rivals.orbslam3.vocabulary import (
     BRANCHING,
@@ -17,7 +18,6 @@ from hippodrome.eval.rivals.orbslam3.vocabulary import (
     to_text,
     train,
 )
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import RecordingPlan, record
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scenario import DriveSpec, Scenario

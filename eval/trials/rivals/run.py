@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from hippodrome._files import write_atomically
 from hippodrome.eval.methods.materials import gather
 from hippodrome.eval.pool import Workers, worker_pool
 from hippodrome.eval.report.report import REPORT, write_report
@@ -20,7 +21,6 @@ from hippodrome.eval.rivals.orbslam3.stage import Tracked, TrackerOptions, locat
 from hippodrome.eval.rivals.sequences import localize_sequences
 from hippodrome.eval.run import RESULTS, evaluate, load_scenarios
 from hippodrome.eval.trials.rivals.comparison import draw_comparison, draw_sequences
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario
 

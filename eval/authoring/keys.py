@@ -23,16 +23,17 @@ SIGNS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Key:
-    """One key: its path in the file, what it takes, what it is without being set, and what it means."""
+    """One key of a scenario."""
 
-    path: tuple[str, ...]
-    kind: str
-    default: Any
-    limits: str
+    path: tuple[str, ...]  # its place in the file, from the outermost key
+    kind: str  # what it takes, in words
+    default: Any  # its value where it is left out
+    limits: str  # limits of a number, in signs; empty: none
     meaning: str
 
     @property
     def name(self) -> str:
+        """The key as people write it, ``mapping.tour.length_m``."""
         return ".".join(self.path)
 
 
@@ -51,6 +52,12 @@ def noise_keys() -> tuple[Key, ...]:
 def is_model(kind: Any) -> bool:
     """Whether a type has keys of its own."""
     return isinstance(kind, type) and (issubclass(kind, BaseModel) or dataclasses.is_dataclass(kind))
+
+
+def models(model: type) -> tuple[type, ...]:
+    """The model itself and all models that its fields hold, each once."""
+    inner = [found for _, kind, _ in fields_of(model) if is_model(kind) for found in models(kind)]
+    return tuple(dict.fromkeys([model, *inner]))
 
 
 def meanings(model: type) -> dict[str, str]:
@@ -101,7 +108,7 @@ def _keys(model: type, path: tuple[str, ...], defaults: Any) -> Iterator[Key]:
 
 
 def _inner_constraints(annotation: Any) -> tuple[Any, ...]:
-    """Of ``Annotated[float, Field(gt=0)] | None``: the constraints sit inside."""
+    """Constraints of the parts of a type: those of ``Annotated[float, Field(gt=0)] | None`` sit inside its first part."""
     inside = (getattr(part, "__metadata__", ()) for part in get_args(annotation))
     infos = [info for metadata in inside for info in metadata]
     return tuple(rule for info in infos for rule in getattr(info, "metadata", (info,)))
@@ -123,6 +130,7 @@ def _kind(annotation: Any) -> str:
 
 
 def _limits(constraints: tuple[Any, ...]) -> str:
+    """Constraints in signs: "> 0, ≤ 5"."""
     found = [
         f"{sign} {_plain(getattr(rule, name))}" for rule in constraints for name, sign in SIGNS.items() if hasattr(rule, name)
     ]
@@ -130,5 +138,5 @@ def _limits(constraints: tuple[Any, ...]) -> str:
 
 
 def _plain(limit: float) -> str:
-    """A limit without an exponent: as people write it."""
+    """A limit without an exponent, as people write it."""
     return f"{limit:,.0f}" if limit == int(limit) else f"{limit:g}"

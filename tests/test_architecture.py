@@ -10,9 +10,9 @@ import hippodrome.core.types
 ROOT = Path(hippodrome.core.types.__file__).parent.parent
 MAY_IMPORT = {
     "core": {"core"},
-    "sim": {"core", "sim"},
-    "proto": {"core", "proto"},
-    "eval": {"core", "sim", "proto", "eval"},
+    "sim": {"_files", "core", "sim"},
+    "proto": {"_files", "core", "proto"},
+    "eval": {"_files", "core", "sim", "proto", "eval"},
 }
 CORE_PACKAGES = {"cv2", "numba", "numpy", "scipy"}
 STANDARD_IN_CORE = {"__future__", "collections", "dataclasses", "enum", "functools", "heapq", "itertools", "math", "typing"}

@@ -3,116 +3,144 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hippodrome.core.matching.search.route import Route
-from hippodrome.core.roads.geometry import interpolate, road_geometry
+from hippodrome.core.roads.geometry import entry_position_m, number_pieces, poses_on_segments, road_geometry
+from hippodrome.core.roads.lane_graph import SHORTEST_STEP_M
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
 
-BoolArray: TypeAlias = NDArray[np.bool_]
-
-SPACING_M = 0.5  # of the line's samples: a polyline's chord over 0.5 m is within a millimetre of any drivable curve
-_CHORD_SAMPLES = 3  # heading over +-1.5 m, as in the lane graph
-_BACK_M = 1.5  # states may step back by rounding; farther back on the same lane means that a loop was driven
+SPACING_M = 0.5  # spacing of the line's samples: a polyline's chord over 0.5 m is within a millimetre of any drivable curve
+_CHORD_SAMPLES = 3  # headings are taken over 1.5 m either way, as in the lane graph
+_BACK_M = 1.5  # positions may step back by rounding; farther back on the same lane means that a loop was driven
 
 
 class Leg(NamedTuple):
-    """A stretch of one lane, or (lane -1) a straight step off the network."""
+    """A part of the way on one lane, or (lane -1) straight ahead off the network."""
 
     lane: int
-    begin_m: float
-    end_m: float
+    begin_m: float  # arc length on the lane; off the network 0
+    end_m: float  # arc length on the lane; off the network the leg's length
     begin_point_m: FloatArray  # (2,) used off the network only
-    end_point_m: FloatArray
+    end_point_m: FloatArray  # (2,) used off the network only
 
     @property
     def length_m(self) -> float:
         return max(self.end_m - self.begin_m, 0.0)
 
 
+class _Passage(NamedTuple):
+    """From one lane to the next: at its end to a successor, or anywhere to an adjacent lane."""
+
+    from_lane: int
+    left_at_m: float  # arc length on the lane that is left
+    to_lane: int
+    entered_at_m: float  # arc length on the lane that is entered
+
+
+class _OpenLane(NamedTuple):
+    """A lane to be walked in search of a place, and how it was reached."""
+
+    lane: int
+    begin_m: float  # distance from the start of the walk to the lane's beginning, negative for the first lanes
+    passages: list[_Passage]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RouteLine:
-    """P samples in driving order."""
+    """A line of P samples in driving order."""
 
     arc_m: FloatArray  # (P,) strictly increasing
     points_m: FloatArray  # (P, 2)
     heading_rad: FloatArray  # (P,)
     lane: IntArray  # (P,) -1: off the network
-    position_m: FloatArray  # (P,) on the lane; 0 off the network
+    position_m: FloatArray  # (P,) arc length on the lane; 0 off the network
 
 
 def route_line(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArray]:
-    """The line through all of a route's states, and the arc length (T,) of each state on it."""
-    legs, state_arc = _legs(route, network)
+    """The line through all samples of a route, and the arc length (T,) of each sample on it."""
+    legs, sample_arc = _legs(route, network)
     lane, position, arc, points = _samples(legs)
     on_lane = lane >= 0
-    points[on_lane] = interpolate(road_geometry(network), lane[on_lane], position[on_lane])[:, :2]
-    return RouteLine(arc, points, _chord_headings(points), lane, position), state_arc
+    points[on_lane] = poses_on_segments(road_geometry(network), lane[on_lane], position[on_lane])[:, :2]
+    return RouteLine(arc, points, _chord_headings(points), lane, position), sample_arc
 
 
 def _legs(route: Route, network: RoadNetwork) -> tuple[list[Leg], FloatArray]:
-    """Stretches driven one after the other, and the arc length (T,) at each state."""
+    """The legs driven one after the other, and the arc length (T,) at each sample of the route."""
     lengths = network.lane_lengths_m()
     legs: list[Leg] = []
-    done, state_arc = 0.0, np.zeros(len(route.lane))
+    done, sample_arc = 0.0, np.zeros(len(route.lane))
     for t in range(1, len(route.lane)):
         step = _step_legs(route, network, lengths, t)
         done += sum(leg.length_m for leg in step)
         legs.extend(step)
-        state_arc[t] = done
-    return legs, state_arc
+        sample_arc[t] = done
+    return legs, sample_arc
 
 
 def _step_legs(route: Route, network: RoadNetwork, lengths_m: FloatArray, t: int) -> list[Leg]:
-    """What lies between the states ``t - 1`` and ``t``."""
-    here, there = int(route.lane[t - 1]), int(route.lane[t])
-    a, b = route.points_m[t - 1], route.points_m[t]
-    if here < 0 or there < 0:
-        return [Leg(-1, 0.0, float(np.hypot(*(b - a))), a, b)]
+    """The legs between the samples ``t - 1`` and ``t`` of the route."""
+    from_lane, to_lane = int(route.lane[t - 1]), int(route.lane[t])
+    from_point, to_point = route.points_m[t - 1], route.points_m[t]
+    if from_lane < 0 or to_lane < 0:
+        return [Leg(-1, 0.0, float(np.hypot(*(to_point - from_point))), from_point, to_point)]
     begin, end = float(route.position_m[t - 1]), float(route.position_m[t])
-    if here == there and end >= begin - _BACK_M:
-        return [Leg(here, begin, end, a, b)]
-    ahead = route.track.step * float(np.exp(route.log_scale[t]))
-    legs, lane = [], here
-    for left, at, into, entry in _chain(network, lengths_m, (here, begin), (there, end), ahead):
-        legs.append(Leg(left, begin, at, a, b))
-        lane, begin = into, entry
-    return [*legs, Leg(lane, begin, end, a, b)]
+    if from_lane == to_lane and end >= begin - _BACK_M:
+        return [Leg(from_lane, begin, end, from_point, to_point)]
+    driven_m = route.track.step * float(np.exp(route.log_scale[t]))
+    legs, lane = [], from_lane
+    for passage in _passages(network, lengths_m, (from_lane, begin), (to_lane, end), driven_m):
+        legs.append(Leg(passage.from_lane, begin, passage.left_at_m, from_point, to_point))
+        lane, begin = passage.to_lane, passage.entered_at_m
+    return [*legs, Leg(lane, begin, end, from_point, to_point)]
 
 
-def _chain(
-    network: RoadNetwork, lengths: FloatArray, here: tuple[int, float], there: tuple[int, float], ahead_m: float
-) -> list[tuple[int, float, int, float]]:
-    """Passages (lane, position left at, lane entered, position entered at) from one place to another about ``ahead_m`` away."""
-    lane, at = here
-    open_: list[tuple[int, float, list[tuple[int, float, int, float]]]] = [(lane, -at, [])]
-    for side in (int(network.left_lane[lane]), int(network.right_lane[lane])):
-        if side >= 0:
-            entry = at * float(lengths[side] / lengths[lane])
-            open_.append((side, -entry, [(lane, at, side, entry)]))
-    best: list[tuple[int, float, int, float]] = []
+def _passages(
+    network: RoadNetwork, lengths_m: FloatArray, start: tuple[int, float], end: tuple[int, float], driven_m: float
+) -> list[_Passage]:
+    """The passages on the way from one (lane, arc length) to another: of all ways the one whose length is nearest to driven.
+
+    As in the lane graph, a lane change is possible at the beginning only. The ways are walked depth-first.
+    """
+    open_ = _first_lanes(network, lengths_m, *start)
+    best: list[_Passage] = []
     best_error = np.inf
     while open_:
-        on, base, passages = open_.pop()
-        error = abs(base + there[1] - ahead_m)
-        if on == there[0] and base + there[1] > -_BACK_M and error < best_error:
-            best, best_error = passages, error
-        end = base + max(float(lengths[on]), 1e-3)
-        if end < 1.5 * ahead_m + 2.0:
-            open_.extend((int(s), end, [*passages, (on, float(lengths[on]), int(s), 0.0)]) for s in network.successors(on))
+        lane, begin_m, passages = open_.pop()
+        ahead_m = begin_m + end[1]
+        if lane == end[0] and ahead_m > -_BACK_M and abs(ahead_m - driven_m) < best_error:
+            best, best_error = passages, abs(ahead_m - driven_m)
+        end_m = begin_m + max(float(lengths_m[lane]), SHORTEST_STEP_M)
+        if end_m < 1.5 * driven_m + 2.0:
+            for successor in network.successors(lane).tolist():
+                passage = _Passage(lane, float(lengths_m[lane]), successor, 0.0)
+                open_.append(_OpenLane(successor, end_m, [*passages, passage]))
     return best
 
 
+def _first_lanes(network: RoadNetwork, lengths_m: FloatArray, lane: int, position_m: float) -> list[_OpenLane]:
+    """The lane on which a way begins, and those that a lane change leads to at once."""
+    open_ = [_OpenLane(lane, -position_m, [])]
+    for side in network.adjacent_lanes(lane):
+        entered_at_m = entry_position_m(position_m, lengths_m[lane], lengths_m[side])
+        open_.append(_OpenLane(side, -entered_at_m, [_Passage(lane, position_m, side, entered_at_m)]))
+    return open_
+
+
 def _samples(legs: list[Leg]) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
-    """Lane, position on it, arc length, and (off the network) point of samples along the legs."""
+    """Samples of the line, ``SPACING_M`` apart along the legs.
+
+    Returns:
+        Lane (P,), arc length on it (P,), arc length on the line (P,), and the point (P, 2), valid off the network only.
+    """
     lengths = np.array([leg.length_m for leg in legs])
     counts = np.where(lengths > 0.0, np.maximum(1, np.round(lengths / SPACING_M)), 0).astype(np.int64)
-    leg = np.repeat(np.arange(len(legs)), counts)
-    share = (np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[leg]
+    leg, number = number_pieces(counts)
+    share = (number + 0.5) / counts[leg]
     along = share * lengths[leg]
     lane = np.array([leg.lane for leg in legs], dtype=np.int32)[leg]
     position = np.where(lane >= 0, np.array([leg.begin_m for leg in legs])[leg] + along, 0.0)
@@ -121,7 +149,7 @@ def _samples(legs: list[Leg]) -> tuple[IntArray, FloatArray, FloatArray, FloatAr
 
 
 def _chord_headings(points_m: FloatArray) -> FloatArray:
-    """Direction (P,) of the chord over ``_CHORD_SAMPLES`` either side."""
+    """Direction (P,) of the chord over ``_CHORD_SAMPLES`` either side of each sample."""
     index = np.arange(len(points_m))
     chord = points_m[np.minimum(index + _CHORD_SAMPLES, len(index) - 1)] - points_m[np.maximum(index - _CHORD_SAMPLES, 0)]
     heading: FloatArray = np.arctan2(chord[:, 1], chord[:, 0])

@@ -1,50 +1,61 @@
-"""Positions on a road network and projections onto it, vectorised over many lanes and points."""
+"""Arithmetic on lane centrelines: from arc lengths to points, from points to the nearest lanes, and between adjacent lanes.
+
+There are two ways from an arc length on a lane to a point. They agree up to rounding; both are kept, because results are to be
+reproduced to the last bit. ``poses_on_segments`` starts at the beginning of the centreline segment and walks along its unit
+direction; ``points_between_vertices`` interpolates linearly between the two neighbouring vertices of the centreline. Likewise
+``RoadGeometry.lane_length_m`` sums segments of lanes only, ``RoadNetwork.lane_lengths_m`` subtracts two running sums.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.spatial import cKDTree
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
 
-SAMPLE_SPACING_M = 5.0  # of the spatial index: finer costs memory, coarser widens the search around each point
-SHORTEST_SEGMENT_M = 1e-9  # drawn points can coincide; such a segment has no direction of its own
+SAMPLE_SPACING_M = 5.0  # spacing of the spatial index: finer costs memory, coarser widens the search around each point
+SHORTEST_SEGMENT_M = 1e-9  # drawn points can coincide; a segment shorter than this has no direction of its own
+SHORTEST_LANE_M = 1e-6  # stands in for the length of a lane that is a single point, where one divides by lengths
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoadGeometry:
-    """A network's S centreline segments, laid out for vectorised queries. Made by ``road_geometry``."""
+    """A network of L lanes as S straight centreline segments, laid out for vectorised queries. Made by ``road_geometry``."""
 
     network: RoadNetwork
     lane_length_m: FloatArray  # (L,)
-    segment_lane: IntArray  # (S,)
-    segment_begin_m: FloatArray  # (S, 2)
+    segment_lane: IntArray  # (S,) lane that each segment belongs to
+    segment_begin_m: FloatArray  # (S, 2) first point of each segment
     segment_direction: FloatArray  # (S, 2) unit vector in driving direction
     segment_length_m: FloatArray  # (S,)
     segment_position_m: FloatArray  # (S,) arc length on its lane at which the segment begins
     segment_start: IntArray  # (L + 1,) lane i owns segments segment_start[i]:segment_start[i + 1]
     sample_segment: IntArray  # (K,) segment of each sample of the spatial index
-    tree: cKDTree  # over the K samples
+    tree: cKDTree  # spatial index over K samples of the segments
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Projections:
-    """Nearest position on each lane near each point: point ``i`` owns rows ``start[i]:start[i + 1]``, nearest lane first."""
+    """Nearest position on each lane near each of N points.
+
+    Point ``i`` owns rows ``start[i]:start[i + 1]``, one row for each lane near it, the nearest lane first.
+    """
 
     start: IntArray  # (N + 1,)
-    point: IntArray  # (K,)
+    point: IntArray  # (K,) index of the projected point
     lane: IntArray  # (K,)
-    position_m: FloatArray  # (K,) arc length on the lane
-    distance_m: FloatArray  # (K,) from the point
-    foot_m: FloatArray  # (K, 2) the position itself
-    heading_rad: FloatArray  # (K,) driving direction there
+    position_m: FloatArray  # (K,) arc length on the lane of the foot of the perpendicular
+    distance_m: FloatArray  # (K,) distance of the foot from the point
+    foot_m: FloatArray  # (K, 2) the foot itself
+    heading_rad: FloatArray  # (K,) driving direction at the foot
 
 
 def road_geometry(network: RoadNetwork) -> RoadGeometry:
-    """Index a network once; every query below takes the result."""
+    """The network laid out for ``poses_on_segments`` and ``project``; make it once for each network."""
     step = np.diff(network.points_m, axis=0)
     inside_lane = np.ones(len(step), dtype=bool)
     inside_lane[network.point_start[1:-1] - 1] = False
@@ -68,13 +79,22 @@ def road_geometry(network: RoadNetwork) -> RoadGeometry:
     )
 
 
-def interpolate(geometry: RoadGeometry, lane: IntArray, position_m: FloatArray) -> FloatArray:
-    """Poses (N, 3) at arc lengths on lanes; a position beyond an end is drawn back to that end."""
+def poses_on_segments(geometry: RoadGeometry, lane: IntArray, position_m: FloatArray) -> FloatArray:
+    """Poses (N, 3) at arc lengths on lanes, reached from the beginning of the segment along its direction.
+
+    Args:
+        geometry: the network's segments.
+        lane: (N,) lane of each pose.
+        position_m: (N,) arc length on that lane; one beyond an end of the lane is taken back to that end.
+
+    Returns:
+        x, y in metres and the heading of the segment in rad.
+    """
     lane = np.asarray(lane)
     position = np.clip(position_m, 0.0, geometry.lane_length_m[lane])
-    offset = np.concatenate([[0.0], np.cumsum(geometry.lane_length_m)])  # makes the positions of all lanes one sorted axis
-    begins = geometry.segment_position_m + offset[geometry.segment_lane]
-    segment = np.searchsorted(begins, position + offset[lane], side="right") - 1
+    lane_offset = np.concatenate([[0.0], np.cumsum(geometry.lane_length_m)])  # puts all lanes on one ascending axis
+    begins = geometry.segment_position_m + lane_offset[geometry.segment_lane]
+    segment = np.searchsorted(begins, position + lane_offset[lane], side="right") - 1
     segment = np.clip(segment, geometry.segment_start[lane], geometry.segment_start[lane + 1] - 1)
     along = np.clip(position - geometry.segment_position_m[segment], 0.0, geometry.segment_length_m[segment])
     direction = geometry.segment_direction[segment]
@@ -83,17 +103,58 @@ def interpolate(geometry: RoadGeometry, lane: IntArray, position_m: FloatArray) 
     return np.concatenate([xy, heading[..., None]], axis=-1)
 
 
+def points_between_vertices(network: RoadNetwork, lane: IntArray, position_m: FloatArray) -> FloatArray:
+    """Points (N, 2) at arc lengths (N,) on lanes (N,), linear between the two neighbouring vertices of the centreline.
+
+    The arc lengths must lie on their lanes: nothing holds them to the lane's ends.
+    """
+    running = network.running_length_m()
+    s = running[network.point_start[lane]] + position_m
+    points: FloatArray = np.stack([np.interp(s, running, network.points_m[:, axis]) for axis in (0, 1)], axis=-1)
+    return points
+
+
+def chord_headings(network: RoadNetwork, lane: IntArray, position_m: FloatArray, half_chord_m: float) -> FloatArray:
+    """Direction (N,) of the chord from ``half_chord_m`` behind to as far ahead of each position, cut at the lane's ends."""
+    lane_end_m = network.lane_lengths_m()[lane]
+    ahead = points_between_vertices(network, lane, np.minimum(position_m + half_chord_m, lane_end_m))
+    behind = points_between_vertices(network, lane, np.maximum(position_m - half_chord_m, 0.0))
+    chord = ahead - behind
+    heading: FloatArray = np.arctan2(chord[:, 1], chord[:, 0])
+    return heading
+
+
+@njit(cache=True)
+def entry_position_m(position_m: float, length_m: float, entered_length_m: float) -> float:
+    """Arc length at which a vehicle at ``position_m`` on a lane of ``length_m`` enters the adjacent lane of ``entered_length_m``.
+
+    Adjacent lanes begin and end side by side but differ in length, in bends above all, so that positions are scaled.
+    """
+    return position_m * (entered_length_m / max(length_m, SHORTEST_LANE_M))
+
+
+def number_pieces(count: IntArray) -> tuple[IntArray, IntArray]:
+    """Owner and number of every piece, if owner ``i`` is cut into ``count[i]`` pieces.
+
+    Returns:
+        The owner (K,) of each piece, ascending, and its number (K,) within the owner, from 0.
+    """
+    owner = np.repeat(np.arange(len(count), dtype=np.int32), count)
+    number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    return owner, number
+
+
 def project(geometry: RoadGeometry, points_m: FloatArray, radius_m: float) -> Projections:
     """The nearest position on every lane that comes within ``radius_m`` of each of the points (N, 2)."""
     points = np.ascontiguousarray(points_m, dtype=np.float64)
     point, segment = _nearby_segments(geometry, points, radius_m)
     along, foot, distance = _feet(geometry, points[point], segment)
     lane = geometry.segment_lane[segment]
-    own = point.astype(np.int64) * geometry.network.lane_count + lane
+    point_and_lane = point.astype(np.int64) * geometry.network.lane_count + lane
     order = np.flatnonzero(distance <= radius_m)
-    order = order[np.lexsort((distance[order], own[order]))]
-    first = np.diff(own[order], prepend=-1) != 0  # of its point and lane: the nearest segment of that lane
-    best = order[first]
+    order = order[np.lexsort((distance[order], point_and_lane[order]))]
+    nearest_of_lane = np.diff(point_and_lane[order], prepend=-1) != 0
+    best = order[nearest_of_lane]
     best = best[np.lexsort((lane[best], distance[best], point[best]))]
     direction = geometry.segment_direction[segment[best]]
     return Projections(
@@ -108,16 +169,15 @@ def project(geometry: RoadGeometry, points_m: FloatArray, radius_m: float) -> Pr
 
 
 def _samples(begin: FloatArray, step: FloatArray, length: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Middles of equal pieces of each segment, none longer than SAMPLE_SPACING_M."""
+    """Each segment in equal pieces of at most SAMPLE_SPACING_M: the segment (K,) of each piece, and its middle (K, 2)."""
     pieces = np.maximum(1, np.ceil(length / SAMPLE_SPACING_M).astype(np.int32))
-    segment = np.repeat(np.arange(len(length), dtype=np.int32), pieces)
-    piece = np.arange(len(segment)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    share = (piece + 0.5) / pieces[segment]
+    segment, number = number_pieces(pieces)
+    share = (number + 0.5) / pieces[segment]
     return segment, begin[segment] + share[:, None] * step[segment]
 
 
 def _directions(step: FloatArray, length: FloatArray) -> FloatArray:
-    """Unit vectors; a segment without length borrows the direction of the nearest one before it that has one."""
+    """Unit vectors (S, 2); a segment without length takes the direction of the nearest one before it that has a length."""
     usable = np.where(length > SHORTEST_SEGMENT_M, np.arange(len(length)), -1)
     source = np.maximum.accumulate(usable)
     source = np.where(source < 0, max(int(np.argmax(usable >= 0)), 0), source)
@@ -126,14 +186,14 @@ def _directions(step: FloatArray, length: FloatArray) -> FloatArray:
 
 
 def _nearby_segments(geometry: RoadGeometry, points: FloatArray, radius_m: float) -> tuple[IntArray, IntArray]:
-    """Pairs (point, segment), some more than once, that hold every pair within the radius."""
+    """Pairs (point, segment) that contain every pair closer than the radius; some are farther apart, some occur twice."""
     reach = radius_m + 0.5 * SAMPLE_SPACING_M
     pairs = cKDTree(points).sparse_distance_matrix(geometry.tree, reach, output_type="ndarray")
     return pairs["i"].astype(np.int32), geometry.sample_segment[pairs["j"]]
 
 
 def _feet(geometry: RoadGeometry, points: FloatArray, segment: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Foot of each point on its segment: arc length on the segment (K,), position (K, 2), distance (K,)."""
+    """Nearest position to each point on its segment: arc length on the segment (K,), the position (K, 2), its distance (K,)."""
     direction, begin = geometry.segment_direction[segment], geometry.segment_begin_m[segment]
     along = np.clip(np.sum((points - begin) * direction, axis=1), 0.0, geometry.segment_length_m[segment])
     foot = begin + along[:, None] * direction

@@ -7,7 +7,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.spatial import cKDTree
 
 from hippodrome.core import se2
-from hippodrome.core.roads.geometry import interpolate, road_geometry
+from hippodrome.core.roads.geometry import poses_on_segments, road_geometry
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.solvers.gauss_newton import gauss_newton
 from hippodrome.core.solvers.pose_costs import local_residual
@@ -149,7 +149,7 @@ def true_path(network, route, rng, step_m=5.0, wander_m=0.2):
     arc = np.cumsum(step_m * rng.uniform(0.8, 1.2, int(ends[-1] / step_m)))
     arc = arc[arc < ends[-1]]
     leg = np.searchsorted(ends, arc, side="right")
-    poses = interpolate(geometry, route[leg], arc - (ends - geometry.lane_length_m[route])[leg])
+    poses = poses_on_segments(geometry, route[leg], arc - (ends - geometry.lane_length_m[route])[leg])
     side = wander_m * np.sin(2.0 * np.pi * (arc / 90.0 + rng.random()))
     poses[:, :2] += side[:, None] * np.column_stack([-np.sin(poses[:, 2]), np.cos(poses[:, 2])])
     return poses, route[leg]

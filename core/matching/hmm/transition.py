@@ -1,4 +1,4 @@
-"""How well a drive between two positions explains the motion between two vertices."""
+"""Transition probability of the hidden Markov model: how well a drive between two positions explains a measured motion."""
 
 from __future__ import annotations
 
@@ -8,17 +8,25 @@ from hippodrome.core.types import FloatArray
 
 
 def log_transition(difference_m: FloatArray, beta_m: float) -> FloatArray:
-    """Logarithm of Eq. (9), Li et al. 2025: an exponential density in d_t; minus infinity where there is no route."""
+    """Logarithm of Eq. (9), Li et al. 2025: an exponential density of d_t.
+
+    Args:
+        difference_m: (K,) d_t of each transition, infinite where no drive leads from one position to the other.
+        beta_m: mean of d_t.
+
+    Returns:
+        The log densities (K,), minus infinity where there is no drive.
+    """
     logarithm: FloatArray = -np.asarray(difference_m) / beta_m - np.log(beta_m)
     return logarithm
 
 
 def distance_difference_m(measured_m: FloatArray, route_m: FloatArray) -> FloatArray:
-    """d_t of Eq. (9), Li et al. 2025: measured against driven distance."""
+    """d_t (K,) of Eq. (9), Li et al. 2025: absolute difference of the measured (K,) and the driving distances (K,)."""
     difference: FloatArray = np.abs(np.asarray(measured_m) - np.asarray(route_m))
     return difference
 
 
 def estimate_beta_m(difference_m: FloatArray) -> float:
-    """beta of Eq. (9), Li et al. 2025, from d_t (T - 1,) along the matched route."""
+    """beta of Eq. (9), Li et al. 2025, from d_t (T - 1,) along the matched route: the median of an exponential is beta ln 2."""
     return float(np.median(difference_m)) / float(np.log(2.0))

@@ -1,12 +1,18 @@
-"""The compiled search behind ``route_search``: a beam over hypotheses forward in time, and what each led to backward.
+"""The compiled search: a beam search forward in time, and the best complete route through each survivor backward in time.
 
-What a hypothesis carries beside its state (``hypotheses``) makes the search exact in length over any number of bins and invariant
-to translation and rotation, at the price that it follows the survivor (as in any particle-like Viterbi).
+Forward, this is the Viterbi algorithm with pruning, known as beam search (B. Lowerre, "The HARPY speech recognition system",
+1976): of the hypotheses in one state only the best is kept, and those that fall behind the best of their step by more than the
+beam are dropped. A hypothesis carries two values beside its state (see ``hypotheses``). They make the search exact in length and
+invariant to translation and rotation, at the price that they are those of the best route to the state, as in a particle filter.
+
+Backward, the best score to each survivor and the best score on from it give the max-marginal of the survivor: the score of the
+best complete route through it. Dropping survivors whose max-marginal is far behind is forward-backward pruning (A. Sixtus and
+S. Ortmanns, "High quality word graphs using forward-backward pruning", 1999). What is left are alternatives to the best route.
 """
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -14,186 +20,287 @@ from numpy.typing import NDArray
 
 from hippodrome.core.matching.search.hypotheses import (
     NOWHERE,
-    Costs,
-    OffNetwork,
-    OffRows,
-    Rows,
-    Tables,
-    put,
+    SUCCESSOR,
+    Hypotheses,
+    Places,
+    Successors,
     with_room,
 )
-from hippodrome.core.matching.search.off_network import MOST_OFF, drive_off
-from hippodrome.core.matching.search.successors import (
-    MOST_SUCCESSORS,
-    jump_bar,
-    moment_at,
-    successors,
-)
+from hippodrome.core.matching.search.model import Drive, SearchModel, StepObservation, observation_of_step
+from hippodrome.core.matching.search.off_network import MOST_OFF, StepRows, drive_off
+from hippodrome.core.matching.search.successors import MOST_SUCCESSORS, jump_bar, successors
+from hippodrome.core.types import Float32Array, FloatArray, IntArray
 
-Survivors: TypeAlias = tuple[NDArray[Any], Rows, OffRows]  # row_start (t + 1,), rows, rows off the network
+
+class BeamLimits(NamedTuple):
+    """What bounds the forward pass."""
+
+    beam_nats: float  # beam width: a hypothesis this far behind the best of its step is dropped
+    most_survivors: int  # about how many may survive a step
+    enough_survivors: int  # the pass ends early once no more than these are left
+    most_rows: int  # the pass ends early once this many hypotheses have survived, all steps together
+
+
+class Survivors(NamedTuple):
+    """The hypotheses that survived each of t steps: step ``s`` owns rows ``row_start[s]:row_start[s + 1]``."""
+
+    row_start: NDArray[np.int64]  # (t + 1,)
+    hypotheses: Hypotheses
+    places: Places  # of the hypotheses off the network
+
+
+class Alternatives(NamedTuple):
+    """Places other than the best route's: sample ``t`` owns rows ``row_start[t]:row_start[t + 1]``."""
+
+    row_start: NDArray[np.int64]  # (T + 1,)
+    points_m: Float32Array  # (rows, 2)
+    through_nats: Float32Array  # (rows,) score of the best complete route through this place, less that of the best of all
+
+
+class _Scratch(NamedTuple):
+    """Memory that the steps share; the two tables hold -1 everywhere between steps."""
+
+    row_of_state: IntArray  # (N * K,) row of the hypothesis in each state, bin by bin
+    row_of_lane: IntArray  # (L,)
+    successors: Successors  # (MOST_SUCCESSORS,)
+    scale_count: int  # K
 
 
 @njit(cache=True, error_model="numpy")
-def forward(
-    headings: NDArray[Any], places: NDArray[Any], step: float, scales: NDArray[Any], tables: Tables, costs: Costs,
-    off: OffNetwork, limits: tuple[float, int, int, int], seeds: Rows, off_seeds: OffRows,
-) -> Survivors:  # fmt: skip
-    """Beam search over T headings and (known) places (T, 3), from hypotheses at heading 0.
+def _make_scratch(model: SearchModel) -> _Scratch:
+    scale_count = model.scales.shape[0]
+    row_of_state = np.full(model.graph.lane.shape[0] * scale_count, -1, np.int32)
+    row_of_lane = np.full(model.graph.lane.max() + 1, -1, np.int32)
+    return _Scratch(row_of_state, row_of_lane, np.empty(MOST_SUCCESSORS, SUCCESSOR), scale_count)
 
-    ``limits``: the beam (nats), about how many may survive a step, how few are enough to end early, and at how many rows in all
-    to end. Returns the survivors of the t <= T steps searched.
+
+@njit(cache=True, error_model="numpy")
+def forward(drive: Drive, model: SearchModel, limits: BeamLimits, initial: Hypotheses, initial_places: Places) -> Survivors:
+    """Beam search over the T samples of a drive, from the hypotheses at its first sample.
+
+    Returns:
+        The survivors of the t <= T samples searched; t < T if a limit was reached or no hypothesis was left.
     """
-    beam, most, enough, budget = limits
-    times, scale_count, lane = headings.shape[0], scales.shape[0], tables[5]
-    size, off_size = seeds.shape[0], off_seeds.shape[0]
-    rows, off_rows = with_room(seeds, size + 1), with_room(off_seeds, off_size + 1)
+    times = drive.heading_rad.shape[0]
+    size, place_count = initial.shape[0], initial_places.shape[0]
+    rows, places = with_room(initial, size + 1), with_room(initial_places, place_count + 1)
     row_start = np.zeros(times + 1, np.int64)
     row_start[1] = size
-    slot = np.full((tables[0].shape[0] - 1) * scale_count, -1, np.int32)
-    lane_slot = np.full(lane.max() + 1, -1, np.int32)
-    out = np.empty((MOST_SUCCESSORS, 5))
+    scratch = _make_scratch(model)
     for t in range(1, times):
         begin, end = row_start[t - 1], row_start[t]
-        moment = moment_at(headings, places, step, t)
-        jump_from, lead = jump_bar(rows[begin:end])
-        size, best = end, NOWHERE
-        for n in range(-1, end - begin):
-            i = begin + (lead if n < 0 else n)  # the best goes first: what it leads to sets the bar for the others
-            score = rows[i].score
-            if n == lead or score < best - beam:
-                continue
-            rows = with_room(rows, size + MOST_SUCCESSORS)
-            most_cost = score - best + beam
-            found = successors(rows[i], off_rows, moment, scales, tables, costs, off, score >= jump_from, most_cost, out)
-            for c in range(found):
-                total = score + out[c, 2]
-                if total < best - beam:
-                    continue
-                best = max(best, total)
-                state = int(out[c, 0]) * scale_count + int(out[c, 1])
-                at = slot[state]
-                if at < 0:
-                    at = size
-                    slot[state] = at
-                    size += 1
-                elif total <= rows[at].score:
-                    continue
-                put(rows, at, int(out[c, 0]), int(out[c, 1]), i, total, out[c, 3], out[c, 4])
-        for i in range(end, size):
-            slot[rows[i].bin * scale_count + rows[i].k] = -1
-        rows, off_rows = with_room(rows, size + MOST_OFF), with_room(off_rows, off_size + MOST_OFF)
-        span = (begin, end, size, off_size)
-        size, off_size, best = drive_off(rows, off_rows, span, best, beam, moment, scales, tables, off, lane_slot)
-        row_start[t + 1] = end + keep_best(rows[end:size], best - beam, most)
-        if row_start[t + 1] - end <= enough or row_start[t + 1] >= budget:
+        observation = observation_of_step(drive, t)
+        rows, size, best = _drive_on(rows, places, begin, end, observation, model, limits.beam_nats, scratch)
+        rows, places = with_room(rows, size + MOST_OFF), with_room(places, place_count + MOST_OFF)
+        filled = StepRows(begin, end, size, place_count)
+        size, place_count, best = drive_off(rows, places, filled, best, limits.beam_nats, observation, model, scratch.row_of_lane)
+        row_start[t + 1] = end + _keep_best(rows[end:size], best - limits.beam_nats, limits.most_survivors)
+        if row_start[t + 1] - end <= limits.enough_survivors or row_start[t + 1] >= limits.most_rows:
             times = t + 1 if row_start[t + 1] > end else t
             break
-    return row_start[: times + 1], rows[: row_start[times]], off_rows[:off_size]
+    return Survivors(row_start[: times + 1], rows[: row_start[times]], places[:place_count])
 
 
 @njit(cache=True, error_model="numpy")
-def keep_best(rows: Rows, bar: float, most: int) -> int:
-    """Move rows that score ``bar`` or more, about the ``most`` best of them, to the front; counted."""
-    if rows.shape[0] > most:
-        scores = np.empty(rows.shape[0], np.float32)
-        for i in range(rows.shape[0]):
-            scores[i] = rows[i].score
-        bar = max(bar, np.partition(scores, rows.shape[0] - most)[rows.shape[0] - most])
+def _drive_on(
+    rows: Hypotheses, places: Places, begin: int, end: int, observation: StepObservation, model: SearchModel, beam_nats: float,
+    scratch: _Scratch,
+) -> tuple[Hypotheses, int, float]:  # fmt: skip
+    """Append the successors on the network of the hypotheses ``begin:end``, the best one of each state.
+
+    Returns:
+        The rows, moved if there was no room left, how many there are now, and the best score of the step.
+    """
+    jump_from, lead = jump_bar(rows[begin:end])
+    size, best = end, NOWHERE
+    for n in range(-1, end - begin):
+        i = begin + (lead if n < 0 else n)  # the best goes first: what it leads to sets the bar for the others
+        score = rows[i].score_nats
+        if n == lead or score < best - beam_nats:
+            continue
+        rows = with_room(rows, size + MOST_SUCCESSORS)
+        most_cost = score - best + beam_nats
+        found = successors(rows[i], places, observation, model, score >= jump_from, most_cost, scratch.successors)
+        size, best = _merge(rows, size, i, scratch.successors[:found], best, beam_nats, scratch)
+    _forget_states(rows[end:size], scratch)
+    return rows, size, best
+
+
+@njit(cache=True, error_model="numpy")
+def _merge(
+    rows: Hypotheses, size: int, parent: int, found: Successors, best: float, beam_nats: float, scratch: _Scratch
+) -> tuple[int, float]:
+    """Append the successors of one hypothesis, unless a better hypothesis is in their state or they fall behind the beam.
+
+    Returns the new number of rows and the best score of the step.
+    """
+    score = rows[parent].score_nats
+    for c in range(found.shape[0]):
+        total = score + found[c].log_likelihood
+        if total < best - beam_nats:
+            continue
+        best = max(best, total)
+        state = found[c].bin * scratch.scale_count + found[c].scale_bin
+        at = scratch.row_of_state[state]
+        if at < 0:
+            at = size
+            scratch.row_of_state[state] = at
+            size += 1
+        elif total <= rows[at].score_nats:
+            continue
+        row = rows[at]
+        row.bin, row.scale_bin, row.parent, row.score_nats = found[c].bin, found[c].scale_bin, parent, total
+        row.heading_offset_rad, row.remainder_m = found[c].heading_offset_rad, found[c].remainder_m
+    return size, best
+
+
+@njit(cache=True, error_model="numpy")
+def _forget_states(hypotheses: Hypotheses, scratch: _Scratch) -> None:
+    """Clear the table of states, which knows these hypotheses."""
+    for i in range(hypotheses.shape[0]):
+        if hypotheses[i].bin >= 0:
+            scratch.row_of_state[hypotheses[i].bin * scratch.scale_count + hypotheses[i].scale_bin] = -1
+
+
+@njit(cache=True, error_model="numpy")
+def _keep_best(hypotheses: Hypotheses, least_nats: float, most: int) -> int:
+    """Move those that score at least ``least_nats``, about the ``most`` best of them, to the front; returns their number."""
+    count = hypotheses.shape[0]
+    if count > most:
+        scores = np.empty(count, np.float32)
+        for i in range(count):
+            scores[i] = hypotheses[i].score_nats
+        least_nats = max(least_nats, np.partition(scores, count - most)[count - most])
     kept = 0
-    for i in range(rows.shape[0]):
-        if rows[i].score >= bar:
-            rows[kept] = rows[i]
+    for i in range(count):
+        if hypotheses[i].score_nats >= least_nats:
+            hypotheses[kept] = hypotheses[i]
             kept += 1
     return kept
 
 
 @njit(cache=True, error_model="numpy")
 def backward(
-    headings: NDArray[Any], places: NDArray[Any], step: float, scales: NDArray[Any], tables: Tables, costs: Costs,
-    off: OffNetwork, margin: float, survivors: Survivors, onward: NDArray[Any],
-) -> NDArray[Any]:  # fmt: skip
-    """How far (rows,) the best complete route through each survivor falls behind the best of all; ``NOWHERE`` beyond ``margin``.
+    drive: Drive, model: SearchModel, margin_nats: float, survivors: Survivors, onward_nats: Float32Array
+) -> Float32Array:
+    """How far the best complete route through each survivor (rows,) falls behind the best of all.
 
-    ``onward``: what the survivors of the last step still lead to, nats.
+    Args:
+        drive: as in the forward pass.
+        model: as in the forward pass.
+        margin_nats: survivors farther behind get ``NOWHERE``.
+        survivors: of the forward pass.
+        onward_nats: best score on from each survivor of the last sample; 0 if the drive ends there.
     """
-    row_start, rows, off_rows = survivors
-    times, scale_count = row_start.shape[0] - 1, scales.shape[0]
+    row_start, rows = survivors.row_start, survivors.hypotheses
+    times = row_start.shape[0] - 1
     through = np.full(rows.shape[0], NOWHERE, np.float32)
     best = NOWHERE
     for i in range(row_start[times - 1], row_start[times]):
-        through[i] = rows[i].score + onward[i - row_start[times - 1]]
+        through[i] = rows[i].score_nats + onward_nats[i - row_start[times - 1]]
         best = max(best, through[i])
-    slot = np.full((tables[0].shape[0] - 1) * scale_count, -1, np.int32)
-    out = np.empty((MOST_SUCCESSORS, 5))
+    scratch = _make_scratch(model)
     for t in range(times - 1, 0, -1):
-        begin, end = row_start[t], row_start[t + 1]
-        moment = moment_at(headings, places, step, t)
-        jump_from, _ = jump_bar(rows[row_start[t - 1] : begin])
-        most_onward = NOWHERE
+        begin, end = row_start[t - 1], row_start[t]
+        observation, (jump_from, _) = observation_of_step(drive, t), jump_bar(rows[begin:end])
+        most_onward = _prune_and_index(survivors, through, t, best - margin_nats, scratch)
         for i in range(begin, end):
-            if through[i] < best - margin:
-                through[i] = NOWHERE
-                continue
-            most_onward = max(most_onward, through[i] - rows[i].score)
-            if rows[i].bin >= 0:
-                slot[rows[i].bin * scale_count + rows[i].k] = i
-            else:
-                through[rows[i].parent] = max(through[rows[i].parent], through[i])
-        for i in range(row_start[t - 1], begin):
-            score = rows[i].score
-            most_cost = score + most_onward - best + margin
+            score = rows[i].score_nats
+            most_cost = score + most_onward - best + margin_nats
             if most_cost < 0.0:
                 continue
-            found = successors(rows[i], off_rows, moment, scales, tables, costs, off, score >= jump_from, most_cost, out)
-            for c in range(found):
-                at = slot[int(out[c, 0]) * scale_count + int(out[c, 1])]
-                if at >= 0:
-                    through[i] = max(through[i], score + out[c, 2] + (through[at] - rows[at].score))
-        for i in range(begin, end):
-            if rows[i].bin >= 0:
-                slot[rows[i].bin * scale_count + rows[i].k] = -1
+            may_jump = score >= jump_from
+            found = successors(rows[i], survivors.places, observation, model, may_jump, most_cost, scratch.successors)
+            _pass_back(rows, through, i, scratch.successors[:found], scratch)
+        _forget_states(rows[end : row_start[t + 1]], scratch)
     for i in range(rows.shape[0]):
-        through[i] = through[i] - best if through[i] >= best - margin else NOWHERE
+        through[i] = through[i] - best if through[i] >= best - margin_nats else NOWHERE
     return through
 
 
 @njit(cache=True, error_model="numpy")
-def alternatives(
-    survivors: Survivors, through: NDArray[Any], points: NDArray[Any], cell: NDArray[Any]
-) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Of the survivors that lead somewhere, the best one in each cell (N,) of the lanes at each step, and all off the network.
+def _prune_and_index(survivors: Survivors, through: Float32Array, t: int, least_nats: float, scratch: _Scratch) -> float:
+    """Prepare the survivors of sample ``t``, whose best complete routes are known, for the step backward from them.
 
-    Returns row_start (t + 1,), points (rows, 2) and through (rows,).
+    Survivors below ``least_nats`` become ``NOWHERE``. The table of states learns where the others on the network are; those off
+    it pass the score of their best complete route on to their parents at once. Returns the best score that any of them has still
+    to come.
     """
-    row_start, rows, off_rows = survivors
+    rows, most_onward = survivors.hypotheses, NOWHERE
+    for i in range(survivors.row_start[t], survivors.row_start[t + 1]):
+        if through[i] < least_nats:
+            through[i] = NOWHERE
+            continue
+        most_onward = max(most_onward, through[i] - rows[i].score_nats)
+        if rows[i].bin >= 0:
+            scratch.row_of_state[rows[i].bin * scratch.scale_count + rows[i].scale_bin] = i
+        else:
+            through[rows[i].parent] = max(through[rows[i].parent], through[i])
+    return most_onward
+
+
+@njit(cache=True, error_model="numpy")
+def _pass_back(rows: Hypotheses, through: Float32Array, i: int, found: Successors, scratch: _Scratch) -> None:
+    """Raise the score of the best complete route through hypothesis ``i`` to that of the best one over its successors."""
+    score = rows[i].score_nats
+    for c in range(found.shape[0]):
+        at = scratch.row_of_state[found[c].bin * scratch.scale_count + found[c].scale_bin]
+        if at >= 0:
+            through[i] = max(through[i], score + found[c].log_likelihood + (through[at] - rows[at].score_nats))
+
+
+@njit(cache=True, error_model="numpy")
+def alternatives(survivors: Survivors, through: Float32Array, points_m: FloatArray, cell: IntArray) -> Alternatives:
+    """The survivors that lead somewhere, thinned: at each sample the best one in each cell of the lanes, and all off the network.
+
+    Args:
+        survivors: of the forward pass.
+        through: (rows,) as the backward pass returns it.
+        points_m: (N, 2) centre of each bin.
+        cell: (N,) cell that each bin belongs to.
+    """
+    row_start, rows = survivors.row_start, survivors.hypotheses
     times, count = row_start.shape[0] - 1, 0
     for i in range(rows.shape[0]):
         count += through[i] > NOWHERE
     kept_start, kept = np.zeros(times + 1, np.int64), np.empty(count, np.int32)
-    slot = np.full(cell.max() + 1, -1, np.int32)
-    size = 0
+    place_of_cell = np.full(cell.max() + 1, -1, np.int32)
     for t in range(times):
-        for i in range(row_start[t], row_start[t + 1]):
-            if through[i] == NOWHERE:
-                continue
-            at = slot[cell[rows[i].bin]] if rows[i].bin >= 0 else -1
-            if at < 0:
-                at, size = size, size + 1
-                if rows[i].bin >= 0:
-                    slot[cell[rows[i].bin]] = at
-            elif through[i] <= through[kept[at]]:
-                continue
-            kept[at] = i
-        for j in range(kept_start[t], size):
-            if rows[kept[j]].bin >= 0:
-                slot[cell[rows[kept[j]].bin]] = -1
-        kept_start[t + 1] = size
-    places, values = np.empty((size, 2), np.float32), np.empty(size, np.float32)
+        kept_start[t + 1] = _keep_best_of_cells(survivors, through, t, cell, kept, kept_start[t], place_of_cell)
+    size = kept_start[times]
+    points, values = np.empty((size, 2), np.float32), np.empty(size, np.float32)
     for j in range(size):
         row = rows[kept[j]]
         values[j] = through[kept[j]]
         if row.bin >= 0:
-            places[j, 0], places[j, 1] = points[row.bin, 0], points[row.bin, 1]
+            points[j, 0], points[j, 1] = points_m[row.bin, 0], points_m[row.bin, 1]
         else:
-            places[j, 0], places[j, 1] = off_rows[-1 - row.bin].x, off_rows[-1 - row.bin].y
-    return kept_start, places, values
+            place = survivors.places[-1 - row.bin]
+            points[j, 0], points[j, 1] = place.x_m, place.y_m
+    return Alternatives(kept_start, points, values)
+
+
+@njit(cache=True, error_model="numpy")
+def _keep_best_of_cells(
+    survivors: Survivors, through: Float32Array, t: int, cell: IntArray, kept: IntArray, size: int, place_of_cell: IntArray
+) -> int:
+    """Append the rows of one sample that ``alternatives`` keeps to ``kept``, which holds ``size`` rows; returns its new size.
+
+    ``place_of_cell`` is scratch memory: -1 everywhere before and after.
+    """
+    rows, first = survivors.hypotheses, size
+    for i in range(survivors.row_start[t], survivors.row_start[t + 1]):
+        if through[i] == NOWHERE:
+            continue
+        at = place_of_cell[cell[rows[i].bin]] if rows[i].bin >= 0 else -1
+        if at < 0:
+            at, size = size, size + 1
+            if rows[i].bin >= 0:
+                place_of_cell[cell[rows[i].bin]] = at
+        elif through[i] <= through[kept[at]]:
+            continue
+        kept[at] = i
+    for j in range(first, size):
+        if rows[kept[j]].bin >= 0:
+            place_of_cell[cell[rows[kept[j]].bin]] = -1
+    return size

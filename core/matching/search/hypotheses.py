@@ -1,8 +1,11 @@
-"""What the parts of the compiled search share: the rows that hold its hypotheses, and tuples in place of dataclasses.
+"""Rows of the compiled search: hypotheses, places off the network, and successors.
 
-A hypothesis on the network is (bin, scale bin) with two carried values: the heading offset between odometry and network, and
-the part of the driven length that the bins could not express. One off the network keeps its index into the rows ``OFF`` as a
-negative bin.
+A hypothesis says that at one sample of the drive the vehicle is in one bin of the lane graph and that a map unit has so many
+metres (scale bin). It carries two values besides: the heading offset between odometry and network, so that the map's rotation
+does not matter, and the remainder of the driven length that whole bins could not express, so that lengths stay exact over any
+number of bins.
+
+A hypothesis off the network has no bin but a place, a row of ``PLACE``; its field ``bin`` holds -1 minus the index of that row.
 """
 
 from __future__ import annotations
@@ -14,39 +17,47 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-# What the callers of a compiled function must keep in order; numba takes tuples, not dataclasses.
-Tables: TypeAlias = tuple[Any, ...]  # reach_start, reach_bin, reach_m, reach_changes, bin heading, bin lane, bin points
-Costs: TypeAlias = tuple[float, ...]  # heading sigma, its limit, gain, half a bin, length sigma, scale step and jump, lane change
-OffNetwork: TypeAlias = tuple[Any, ...]  # see ``expand_off``; then leave (nats), per step (nats), spread (nats)
-Moment: TypeAlias = tuple[float, ...]  # of a step: heading at its end, on its way, length; x, y, 1/sigma^2 of the known place
-Rows: TypeAlias = NDArray[Any]  # of ROW
-OffRows: TypeAlias = NDArray[Any]  # of OFF
+Hypothesis: TypeAlias = Any  # one row of HYPOTHESIS, as compiled functions take it
+Hypotheses: TypeAlias = NDArray[Any]  # rows of HYPOTHESIS
+Places: TypeAlias = NDArray[Any]  # rows of PLACE
+Successors: TypeAlias = NDArray[Any]  # rows of SUCCESSOR
 
-NOWHERE = -math.inf  # nats of what leads nowhere
+NOWHERE = -math.inf  # score in nats of a hypothesis that leads nowhere
 
-ROW = np.dtype(
+HYPOTHESIS = np.dtype(
     [
-        ("bin", np.int32),  # -1 - index into the rows off the network: off the network
-        ("k", np.int32),  # scale bin
-        ("parent", np.int32),  # row of the step before
-        ("score", np.float32),  # log likelihood so far, nats
-        ("offset", np.float32),  # network heading minus odometry heading, rad
-        ("rest", np.float32),  # driven length beyond the bin's centre, m
+        ("bin", np.int32),  # bin of the lane graph; -1 - index of its place if off the network
+        ("scale_bin", np.int32),  # index of the scale, metres per map unit
+        ("parent", np.int32),  # row of the hypothesis of the step before that it was reached from
+        ("score_nats", np.float32),  # log likelihood of the best route to here
+        ("heading_offset_rad", np.float32),  # network heading minus odometry heading
+        ("remainder_m", np.float32),  # driven length beyond the bin's centre
     ],
     align=True,
 )
-OFF = np.dtype([("x", np.float32), ("y", np.float32), ("away", np.float32)], align=True)  # place and metres driven since leaving
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def put(rows: Rows, at: int, bin_: int, k: int, parent: int, score: float, offset: float, rest: float) -> None:
-    row = rows[at]
-    row.bin, row.k, row.parent, row.score, row.offset, row.rest = bin_, k, parent, score, offset, rest
+PLACE = np.dtype(
+    [
+        ("x_m", np.float32),  # dead-reckoned place
+        ("y_m", np.float32),
+        ("driven_m", np.float32),  # metres driven since the network was left
+    ],
+    align=True,
+)
+SUCCESSOR = np.dtype(
+    [
+        ("bin", np.int32),
+        ("scale_bin", np.int32),
+        ("log_likelihood", np.float64),  # of the step that leads to it, nats
+        ("heading_offset_rad", np.float64),
+        ("remainder_m", np.float64),
+    ],
+    align=True,
+)
 
 
 @njit(cache=True, error_model="numpy")
 def with_room(rows: NDArray[Any], size: int) -> NDArray[Any]:
-    """``rows`` itself if it holds ``size``, else a copy at least twice as long."""
+    """``rows`` itself if it holds ``size`` rows, else a copy at least twice as long."""
     if size <= rows.shape[0]:
         return rows
     bigger = np.empty(max(size, 2 * rows.shape[0]), rows.dtype)

@@ -1,159 +1,202 @@
-"""Hypotheses off the network, compiled: who may leave it, and where those that left may come back.
+"""Hypotheses off the network, compiled: which may leave it, where dead reckoning takes them, and where they come back.
 
-They move by dead reckoning, from where the route was well known to near where a lane is taken up again.
+A hypothesis leaves from where the route was well known, moves by dead reckoning, and may come back to any lane near its place
+whose direction fits.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from hippodrome.core.matching.search.hypotheses import (
-    NOWHERE,
-    Costs,
-    Moment,
-    OffNetwork,
-    OffRows,
-    Rows,
-    Tables,
-    put,
-)
+from hippodrome.core.matching.search.hypotheses import NOWHERE, Hypotheses, Hypothesis, Places, Successors
+from hippodrome.core.matching.search.model import SearchModel, StepCosts, StepObservation
+from hippodrome.core.roads.lane_graph import BinGrid
 from hippodrome.core.se2 import wrap_near_zero
-
-Place: TypeAlias = tuple[float, float, float]
+from hippodrome.core.types import IntArray
 
 MOST_OFF = 192  # hypotheses off the network in one step; beyond this the worst gives way
-_SAME_PLACE_M = 4.0  # closer than this, two hypotheses off the network count as one
-_SAME_OFFSET_RAD = 0.3
+_SAME_PLACE_M = 4.0  # closer than this, two hypotheses off the network count as one ...
+_SAME_OFFSET_RAD = 0.3  # ... if their heading offsets are no farther apart than this
 _KNOWN_LANES = 30  # good hypotheses on more lanes than this: the route is not known, so nothing can be said to leave the network
+_PLACE_SIGMA_M = 2.0  # sigma of a place at which the network was just left; it grows with the metres driven since
+_RETURN_SIGMAS = 2.5  # a lane farther away than this is not taken up again
+_OFFSET_SIGMAS = 3.0  # a heading error beyond this many sigmas pulls the heading offset no more than one of this size
+
+
+class Place(NamedTuple):
+    """A dead-reckoned place."""
+
+    x_m: float
+    y_m: float
+    driven_m: float  # metres driven since the network was left
+
+
+class StepRows(NamedTuple):
+    """Which rows of the hypotheses and of the places are filled while a step is made."""
+
+    begin: int  # hypotheses begin:end are those before the step ...
+    end: int
+    size: int  # ... and end:size those after it, as far as they are found
+    place_count: int
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def followed_offset(offset_rad: float, turn_rad: float, costs: StepCosts) -> float:
+    """The heading offset after a heading error of ``turn_rad``: it takes over a share of the error, and so follows gyro drift."""
+    most = _OFFSET_SIGMAS * costs.heading_sigma_rad
+    return wrap_near_zero(offset_rad + costs.offset_gain * min(max(turn_rad, -most), most))
 
 
 @njit(cache=True, error_model="numpy")
-def expand_off(
-    x: float,
-    y: float,
-    away: float,
-    k: int,
-    offset: float,
-    heading: float,
-    tables: Tables,
-    costs: Costs,
-    off: OffNetwork,
-    out: NDArray[Any],
-) -> int:
-    """Bins on which a hypothesis at (x, y) may come back to the network, counted; rows of ``out`` as in ``expand``."""
-    bin_heading, sigma, limit, gain = tables[4], costs[0], costs[1], costs[2]
-    points, cell_start, cell_bin, origin_x, origin_y, cell_m, columns, rows, enter, drift, turn_limit = off[:11]
-    spread = 2.0 + drift * away
-    radius = 2.5 * spread
-    count = 0
-    column_0 = max(int((x - radius - origin_x) / cell_m), 0)
-    column_1 = min(int((x + radius - origin_x) / cell_m), columns - 1)
+def rejoin(hypothesis: Hypothesis, place: Place, observation: StepObservation, model: SearchModel, out: Successors) -> int:
+    """Bins on which a hypothesis off the network, now at ``place``, may come back: writes them into ``out``, counted."""
+    graph, costs, off = model.graph, model.costs, model.off_network
+    spread = _PLACE_SIGMA_M + off.drift * place.driven_m
+    radius = _RETURN_SIGMAS * spread
+    column_0, column_1, row_0, row_1 = _cells_around(off.grid, place.x_m, place.y_m, radius)
     if column_0 > column_1:
         return 0
-    row_0 = max(int((y - radius - origin_y) / cell_m), 0)
-    row_1 = min(int((y + radius - origin_y) / cell_m), rows - 1)
+    count = 0
     for row in range(row_0, row_1 + 1):
-        for c in range(cell_start[row * columns + column_0], cell_start[row * columns + column_1 + 1]):
-            bin_ = cell_bin[c]
-            gap_sq = (points[bin_, 0] - x) ** 2 + (points[bin_, 1] - y) ** 2
-            turn = wrap_near_zero(bin_heading[bin_] - heading - offset)
-            if gap_sq > radius * radius or abs(turn) > turn_limit:
+        first_cell, last_cell = row * off.grid.columns + column_0, row * off.grid.columns + column_1
+        for n in range(off.grid.start[first_cell], off.grid.start[last_cell + 1]):
+            bin_ = off.grid.bin[n]
+            gap_sq = (graph.points_m[bin_, 0] - place.x_m) ** 2 + (graph.points_m[bin_, 1] - place.y_m) ** 2
+            turn = wrap_near_zero(graph.heading_rad[bin_] - observation.heading_rad - hypothesis.heading_offset_rad)
+            if gap_sq > radius * radius or abs(turn) > off.turn_limit_rad:
                 continue
             if count == out.shape[0]:
                 return count
-            out[count, 0] = bin_
-            out[count, 1] = k
-            out[count, 2] = -(enter + 0.5 * gap_sq / spread**2 + min(0.5 * (turn / sigma) ** 2, limit))
-            out[count, 3] = wrap_near_zero(offset + gain * min(max(turn, -3.0 * sigma), 3.0 * sigma))
-            out[count, 4] = 0.0
+            heading_cost = min(0.5 * (turn / costs.heading_sigma_rad) ** 2, costs.heading_limit_nats)
+            successor = out[count]
+            successor.bin, successor.scale_bin, successor.remainder_m = bin_, hypothesis.scale_bin, 0.0
+            successor.log_likelihood = -(off.return_nats + 0.5 * gap_sq / spread**2 + heading_cost)
+            successor.heading_offset_rad = followed_offset(hypothesis.heading_offset_rad, turn, costs)
             count += 1
     return count
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _cells_around(grid: BinGrid, x_m: float, y_m: float, radius_m: float) -> tuple[int, int, int, int]:
+    """First and last column, first and last row of the cells that a circle touches; the last is below the first if none."""
+    column_0 = max(int((x_m - radius_m - grid.origin_m[0]) / grid.cell_m), 0)
+    column_1 = min(int((x_m + radius_m - grid.origin_m[0]) / grid.cell_m), grid.columns - 1)
+    row_0 = max(int((y_m - radius_m - grid.origin_m[1]) / grid.cell_m), 0)
+    row_1 = min(int((y_m + radius_m - grid.origin_m[1]) / grid.cell_m), grid.rows - 1)
+    return column_0, column_1, row_0, row_1
+
+
 @njit(cache=True, error_model="numpy")
-def move_off(row: Any, off_rows: OffRows, moment: Moment, scales: NDArray[Any], points: NDArray[Any]) -> Place:
-    """Where dead reckoning takes a hypothesis over one step: x, y, metres driven since it left the network."""
-    _, course, step, _, _, _ = moment
-    far = step * scales[row.k]
-    x, y = far * math.cos(course + row.offset), far * math.sin(course + row.offset)
-    if row.bin >= 0:
-        return x + points[row.bin, 0], y + points[row.bin, 1], far
-    left = off_rows[-1 - row.bin]
-    return x + left.x, y + left.y, far + left.away
+def dead_reckoned(hypothesis: Hypothesis, places: Places, observation: StepObservation, model: SearchModel) -> Place:
+    """Where dead reckoning takes a hypothesis over one step, from its bin's centre or from its place off the network."""
+    far = observation.step * model.scales[hypothesis.scale_bin]
+    course = observation.course_rad + hypothesis.heading_offset_rad
+    x, y = far * math.cos(course), far * math.sin(course)
+    if hypothesis.bin >= 0:
+        return Place(x + model.graph.points_m[hypothesis.bin, 0], y + model.graph.points_m[hypothesis.bin, 1], far)
+    left = places[-1 - hypothesis.bin]
+    return Place(x + left.x_m, y + left.y_m, far + left.driven_m)
 
 
 @njit(cache=True, error_model="numpy")
 def drive_off(
-    rows: Rows, off_rows: OffRows, span: tuple[int, int, int, int], best: float, beam: float, moment: Moment,
-    scales: NDArray[Any], tables: Tables, off: OffNetwork, lane_slot: NDArray[Any],
+    hypotheses: Hypotheses, places: Places, rows: StepRows, best: float, beam_nats: float, observation: StepObservation,
+    model: SearchModel, row_of_lane: IntArray,
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Add the hypotheses that are off the network after a step: those that were before it, and those that leave now.
+    """Append the hypotheses that are off the network after a step: those that were before it, and those that leave now.
 
-    ``span``: rows before the step (begin, end), rows in all, rows off the network; both arrays have room for ``MOST_OFF`` more.
-    Returns the new counts and the best score.
+    Both arrays have room for ``MOST_OFF`` more rows. Of hypotheses near each other the best is kept, and of too many the worst
+    gives way.
+
+    Returns:
+        How many hypotheses and how many places there are now, and the best score of the step.
     """
-    begin, end, size, off_size = span
-    first, points, lane, leave_cost, step_cost, spread = size, off[0], tables[5], off[11], off[12], off[13]
-    going = leavers(rows[begin:end], spread, lane, lane_slot)
-    for n in range(begin, end + going.shape[0]):
-        i = n if n < end else begin + going[n - end]
-        row = rows[i]
-        if n < end and row.bin >= 0:
-            continue
-        total = row.score - step_cost - (0.0 if row.bin < 0 else leave_cost)
-        if total < best - beam:
+    off, size, place_count = model.off_network, rows.size, rows.place_count
+    for i in _going_off(hypotheses, rows.begin, rows.end, model, row_of_lane):
+        parent = hypotheses[i]
+        total = parent.score_nats - off.step_nats - (0.0 if parent.bin < 0 else off.leave_nats)
+        if total < best - beam_nats:
             continue
         best = max(best, total)
-        x, y, away = move_off(row, off_rows, moment, scales, points)
-        at, worst = -1, first
-        for other in range(first, size):
-            there = off_rows[-1 - rows[other].bin]
-            if (
-                abs(there.x - x) + abs(there.y - y) < _SAME_PLACE_M
-                and abs(wrap_near_zero(rows[other].offset - row.offset)) < _SAME_OFFSET_RAD
-            ):
-                at = other
-            worst = other if rows[other].score < rows[worst].score else worst
-        if at < 0 and size - first == MOST_OFF:
-            at = worst
+        place = dead_reckoned(parent, places, observation, model)
+        at = _row_to_replace(hypotheses, places, rows.size, size, place, parent.heading_offset_rad)
         if at < 0:
-            at, size, off_size = size, size + 1, off_size + 1
-            rows[at].bin = -off_size
-        elif total <= rows[at].score:
+            at, size, place_count = size, size + 1, place_count + 1
+            hypotheses[at].bin = -place_count
+        elif total <= hypotheses[at].score_nats:
             continue
-        j = -1 - rows[at].bin
-        off_rows[j].x, off_rows[j].y, off_rows[j].away = x, y, away
-        put(rows, at, -1 - j, row.k, i, total, row.offset, 0.0)
-    return size, off_size, best
+        there = places[-1 - hypotheses[at].bin]
+        there.x_m, there.y_m, there.driven_m = place.x_m, place.y_m, place.driven_m
+        child = hypotheses[at]
+        child.scale_bin, child.parent, child.score_nats = parent.scale_bin, i, total
+        child.heading_offset_rad, child.remainder_m = parent.heading_offset_rad, 0.0
+    return size, place_count, best
 
 
 @njit(cache=True, error_model="numpy")
-def leavers(rows: Rows, spread: float, lane: NDArray[Any], slot: NDArray[Any]) -> NDArray[Any]:
-    """The best row on each lane, among those within ``spread`` of the best; none if these are on too many lanes."""
-    best = NOWHERE
-    for i in range(rows.shape[0]):
-        best = max(best, rows[i].score)
+def _row_to_replace(
+    hypotheses: Hypotheses, places: Places, first: int, size: int, place: Place, heading_offset_rad: float
+) -> int:
+    """Among the hypotheses ``first:size`` off the network the last one that is about the same as the new one.
+
+    If there is none, -1 as long as there are fewer than ``MOST_OFF``, else the worst one.
+    """
+    same, worst = -1, first
+    for other in range(first, size):
+        there = places[-1 - hypotheses[other].bin]
+        if (
+            abs(there.x_m - place.x_m) + abs(there.y_m - place.y_m) < _SAME_PLACE_M
+            and abs(wrap_near_zero(hypotheses[other].heading_offset_rad - heading_offset_rad)) < _SAME_OFFSET_RAD
+        ):
+            same = other
+        worst = other if hypotheses[other].score_nats < hypotheses[worst].score_nats else worst
+    return worst if same < 0 and size - first == MOST_OFF else same
+
+
+@njit(cache=True, error_model="numpy")
+def _going_off(hypotheses: Hypotheses, begin: int, end: int, model: SearchModel, row_of_lane: IntArray) -> NDArray[np.int64]:
+    """Rows of the hypotheses that are off the network after the step: those off it already, then those that leave it now."""
+    rows, count = np.empty(end - begin + _KNOWN_LANES, np.int64), 0
+    for i in range(begin, end):
+        if hypotheses[i].bin < 0:
+            rows[count] = i
+            count += 1
+    for i in _leaving(hypotheses[begin:end], model, row_of_lane):
+        rows[count] = begin + i
+        count += 1
+    return rows[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def _leaving(hypotheses: Hypotheses, model: SearchModel, row_of_lane: IntArray) -> NDArray[np.int64]:
+    """The best hypothesis on each lane, among those close to the best of all; none if these are on too many lanes.
+
+    ``row_of_lane`` (L,) is scratch memory: -1 everywhere before and after.
+    """
+    lane, best = model.graph.lane, NOWHERE
+    for i in range(hypotheses.shape[0]):
+        best = max(best, hypotheses[i].score_nats)
     found, count = np.empty(_KNOWN_LANES, np.int64), 0
-    known = True
-    for i in range(rows.shape[0]):
-        if rows[i].bin < 0 or rows[i].score < best - spread:
+    route_is_known = True
+    for i in range(hypotheses.shape[0]):
+        if hypotheses[i].bin < 0 or hypotheses[i].score_nats < best - model.off_network.spread_nats:
             continue
-        at = slot[lane[rows[i].bin]]
+        at = row_of_lane[lane[hypotheses[i].bin]]
         if at >= 0:
-            if rows[i].score > rows[found[at]].score:
+            if hypotheses[i].score_nats > hypotheses[found[at]].score_nats:
                 found[at] = i
         elif count == _KNOWN_LANES:
-            known = False
+            route_is_known = False
             break
         else:
-            slot[lane[rows[i].bin]] = count
+            row_of_lane[lane[hypotheses[i].bin]] = count
             found[count] = i
             count += 1
-    for c in range(count):
-        slot[lane[rows[found[c]].bin]] = -1
-    return found[:count] if known else found[:0]
+    for n in range(count):
+        row_of_lane[lane[hypotheses[found[n]].bin]] = -1
+    return found[:count] if route_is_known else found[:0]

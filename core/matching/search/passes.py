@@ -1,7 +1,8 @@
-"""The passes of the search over a whole drive, in bounded memory.
+"""Forward and backward pass of the search over a whole drive, in bounded memory.
 
-The forward pass keeps its survivors at checkpoints only. The backward pass, last stretch first, makes each stretch's survivors
-anew from its checkpoint, so that the answer is that of one search over the whole drive; a drive of one stretch is searched once.
+The forward pass keeps its survivors at checkpoints only. The backward pass begins with the last section of the drive and makes
+the survivors of each section anew from its checkpoint (as in J. A. Grice, R. Hughey, D. Speck, "Reduced space sequence alignment",
+1997). The answer is that of one search over the whole drive; a drive of a single section is searched once.
 """
 
 from __future__ import annotations
@@ -9,107 +10,118 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hippodrome.core.matching.search import beam as route_kernel
+from hippodrome.core.matching.search.beam import Alternatives, BeamLimits, Survivors, alternatives, backward, forward
 from hippodrome.core.matching.search.config import RouteSearchConfig
-from hippodrome.core.matching.search.hypotheses import Rows
-from hippodrome.core.matching.search.problem import KernelArguments, SearchField, Seeds
+from hippodrome.core.matching.search.hypotheses import Hypotheses
+from hippodrome.core.matching.search.model import Drive, SearchModel
+from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, compiled_drive, compiled_model
 from hippodrome.core.types import Float32Array, FloatArray, IntArray
 
-_MOST_ROWS = 8_000_000  # of a stretch: 200 MB
-_EXACT_NATS = 4000.0  # scores below this are counted from a new zero: their steps would be rounded to 0.0005 and more
-_CELL_M = 8.0  # of a lane: alternatives closer than this are one
+_MAX_ROWS = 8_000_000  # hypotheses of a section: 200 MB
+_EXACT_NATS = 4000.0  # scores below minus this are counted from a new zero, else single precision rounds them by 0.0005 and more
+_CELL_M = 8.0  # length of a lane's cell: alternatives in one cell are one
 
 
-class Found(NamedTuple):
-    """The best route's rows and places, and its alternatives; see ``RouteAlternatives``."""
+class TracedRoute(NamedTuple):
+    """The best route's hypotheses and places at T samples, and its alternatives."""
 
-    rows: Rows  # (T,)
-    places_m: FloatArray  # (T, 2)
+    hypotheses: Hypotheses  # (T,)
+    points_m: FloatArray  # (T, 2) centre of the bin, or the dead-reckoned place
     score_nats: FloatArray  # (T,) log likelihood up to each sample
-    row_start: NDArray[np.int64]
-    points_m: Float32Array
-    through_nats: Float32Array
+    alternatives: Alternatives
 
 
-class _Stretch(NamedTuple):
-    first: int  # sample that its seeds belong to
-    last: int  # .. and where the next stretch begins
-    seeds: Seeds
-    score_nats: float  # what was taken off the seeds' scores, so that small differences stay exact
+class _Section(NamedTuple):
+    """A part of the drive between two checkpoints; the last sample of a section is the first one of the next."""
+
+    first: int  # sample of the checkpoint that it begins with
+    last: int  # sample of the checkpoint that it ends with
+    initial: InitialHypotheses  # the survivors at the first sample
+    score_offset_nats: float  # to be added to all scores of the section
 
 
-def survivors_from(
-    arguments: KernelArguments, seeds: Seeds, beam_nats: float, most: int, enough: int = 0
-) -> route_kernel.Survivors:
-    """One forward pass, ended early once ``enough`` are left or ``_MOST_ROWS`` are reached."""
-    limits = beam_nats, most, enough, max(_MOST_ROWS, 4 * len(seeds.rows))
-    survivors: route_kernel.Survivors = route_kernel.forward(*arguments, limits, *seeds)
+def forward_pass(
+    drive: Drive, model: SearchModel, initial: InitialHypotheses, beam_nats: float, most: int, enough: int = 0
+) -> Survivors:
+    """One beam search, ended early once no more than ``enough`` survivors are left or there is no room for more."""
+    limits = BeamLimits(beam_nats, most, enough, max(_MAX_ROWS, 4 * len(initial.hypotheses)))
+    survivors: Survivors = forward(drive, model, limits, *initial)
     return survivors
 
 
-def best_through(field: SearchField, arguments: KernelArguments, seeds: Seeds, config: RouteSearchConfig) -> Found | None:
-    """The most likely route from ``seeds`` over the whole drive; None where none is as long."""
-    stretches: list[_Stretch] = []
-    first, taken_off, samples = 0, 0.0, len(arguments.heading_rad)
-    while len(seeds.rows):
-        survivors = survivors_from(_between(arguments, first, samples), seeds, config.beam_nats, config.most_survivors)
-        last = first + len(survivors[0]) - 2
-        stretches.append(_Stretch(first, last, seeds, taken_off))
+def most_likely_route(
+    problem: SearchProblem, initial: InitialHypotheses, config: RouteSearchConfig, place_prior: FloatArray | None = None
+) -> TracedRoute | None:
+    """The most likely route from the initial hypotheses over the whole drive; None where no route is as long."""
+    drive = compiled_drive(problem, problem.track.heading_rad, place_prior)
+    model = compiled_model(problem)
+    sections: list[_Section] = []
+    first, score_offset, samples = 0, 0.0, len(drive.heading_rad)
+    while len(initial.hypotheses):
+        survivors = forward_pass(_samples(drive, first, samples), model, initial, config.beam_nats, config.most_survivors)
+        last = first + len(survivors.row_start) - 2
+        sections.append(_Section(first, last, initial, score_offset))
         if last == samples - 1:
-            return _traced(field, arguments, stretches, survivors, config)
+            return _backward_pass(problem, drive, model, sections, survivors, config)
         if last == first:
             break
-        seeds = last_of(survivors)
-        best = seeds.rows["score"].max()
+        initial = last_survivors(survivors)
+        best = initial.hypotheses["score_nats"].max()
         best = best if best < -_EXACT_NATS else np.float32(0.0)
-        seeds.rows["score"] -= best
-        first, taken_off = last, taken_off + float(best)
+        initial.hypotheses["score_nats"] -= best
+        first, score_offset = last, score_offset + float(best)
     return None
 
 
-def last_of(survivors: route_kernel.Survivors) -> Seeds:
-    """The survivors of the last step, as seeds of a further search."""
-    row_start, rows, off_rows = survivors
-    last = rows[row_start[-2] : row_start[-1]].copy()
+def last_survivors(survivors: Survivors) -> InitialHypotheses:
+    """The survivors of the last step, to begin a further search with."""
+    last = survivors.hypotheses[survivors.row_start[-2] : survivors.row_start[-1]].copy()
     off = last["bin"] < 0
-    places = off_rows[-1 - last["bin"][off]]
+    places = survivors.places[-1 - last["bin"][off]]
     last["bin"][off] = -1 - np.arange(len(places))
-    return Seeds(last, places)
+    return InitialHypotheses(last, places)
 
 
-def _between(arguments: KernelArguments, first: int, end: int) -> KernelArguments:
-    return arguments._replace(heading_rad=arguments.heading_rad[first:end], places=arguments.places[first:end])
+def _samples(drive: Drive, first: int, end: int) -> Drive:
+    """The samples ``first:end`` of a drive."""
+    return drive._replace(heading_rad=drive.heading_rad[first:end], place_prior=drive.place_prior[first:end])
 
 
-def _traced(
-    field: SearchField,
-    arguments: KernelArguments,
-    stretches: list[_Stretch],
-    survivors: route_kernel.Survivors,
+def _backward_pass(
+    problem: SearchProblem,
+    drive: Drive,
+    model: SearchModel,
+    sections: list[_Section],
+    survivors: Survivors,
     config: RouteSearchConfig,
-) -> Found:
-    """The backward pass, over the survivors of the last stretch and those of the others, made anew."""
-    cell = _cells(field)
-    end_rows = last_of(survivors).rows
-    end, onward = int(np.argmax(end_rows["score"])), np.zeros(len(end_rows), np.float32)
-    parts: list[Found] = []
-    for stretch in reversed(stretches):
-        own = _between(arguments, stretch.first, stretch.last + 1)
+) -> TracedRoute:
+    """The best route and its alternatives, section by section from the last, whose survivors are given."""
+    cell = _cells(problem)
+    last = last_survivors(survivors).hypotheses
+    end, onward = int(np.argmax(last["score_nats"])), np.zeros(len(last), np.float32)
+    parts: list[TracedRoute] = []
+    for section in reversed(sections):
+        own = _samples(drive, section.first, section.last + 1)
         if parts:
-            survivors = survivors_from(own, stretch.seeds, config.beam_nats, config.most_survivors)
-        through = route_kernel.backward(*own, config.margin_nats, survivors, onward)
-        row = _trace(survivors, end)
-        alternatives = route_kernel.alternatives(survivors, through, field.graph.points_m, cell)
-        parts.append(_part(field, survivors, row, stretch.score_nats, alternatives))
-        end, onward = int(row[0]), through[: len(stretch.seeds.rows)] - stretch.seeds.rows["score"]
+            survivors = forward_pass(own, model, section.initial, config.beam_nats, config.most_survivors)
+        through = backward(own, model, config.margin_nats, survivors, onward)
+        row = _trace_back(survivors, end)
+        thinned = alternatives(survivors, through, problem.graph.points_m, cell)
+        parts.append(_traced(problem, survivors, row, section.score_offset_nats, thinned))
+        end, onward = int(row[0]), _onward_nats(through, section.initial)
     return _joined(parts[::-1])
 
 
-def _trace(survivors: route_kernel.Survivors, end: int) -> IntArray:
+def _onward_nats(through: Float32Array, initial: InitialHypotheses) -> Float32Array:
+    """What each initial hypothesis of a section still leads to: the best complete route through it, less the way to it."""
+    onward: Float32Array = through[: len(initial.hypotheses)] - initial.hypotheses["score_nats"]
+    return onward
+
+
+def _trace_back(survivors: Survivors, end: int) -> IntArray:
     """Rows (t,) of the route that ends in the ``end``-th survivor of the last step."""
-    row_start, parent = survivors[0], survivors[1]["parent"]
+    row_start, parent = survivors.row_start, survivors.hypotheses["parent"]
     row = np.empty(len(row_start) - 1, np.int32)
     row[-1] = row_start[-2] + end
     for t in range(len(row) - 1, 0, -1):
@@ -117,41 +129,44 @@ def _trace(survivors: route_kernel.Survivors, end: int) -> IntArray:
     return row
 
 
-def _part(
-    field: SearchField,
-    survivors: route_kernel.Survivors,
-    row: IntArray,
-    score_nats: float,
-    alternatives: tuple[NDArray[np.int64], Float32Array, Float32Array],
-) -> Found:
-    _, rows, off_rows = survivors
-    best = rows[row].copy()
+def _traced(
+    problem: SearchProblem, survivors: Survivors, row: IntArray, score_offset_nats: float, thinned: Alternatives
+) -> TracedRoute:
+    """The route through the given rows (t,) of a section's survivors."""
+    best = survivors.hypotheses[row].copy()
     off = best["bin"] < 0
-    places = field.graph.points_m[np.maximum(best["bin"], 0)].astype(np.float64)
-    there = off_rows[-1 - best["bin"][off]]
-    places[off] = np.column_stack([there["x"], there["y"]])
-    return Found(best, places, best["score"] + score_nats, *alternatives)
+    points = problem.graph.points_m[np.maximum(best["bin"], 0)].astype(np.float64)
+    places = survivors.places[-1 - best["bin"][off]]
+    points[off] = np.column_stack([places["x_m"], places["y_m"]])
+    return TracedRoute(best, points, best["score_nats"] + score_offset_nats, thinned)
 
 
-def _joined(parts: list[Found]) -> Found:
-    """One after the other; the last sample of each is the first of the next."""
+def _joined(parts: list[TracedRoute]) -> TracedRoute:
+    """The sections one after the other; the last sample of each is the first one of the next and counts once."""
     whole = parts[-1]
     for part in parts[-2::-1]:
-        kept = part.row_start[-2]
-        whole = Found(
-            np.concatenate([part.rows[:-1], whole.rows]),
-            np.concatenate([part.places_m[:-1], whole.places_m]),
+        whole = TracedRoute(
+            np.concatenate([part.hypotheses[:-1], whole.hypotheses]),
+            np.concatenate([part.points_m[:-1], whole.points_m]),
             np.concatenate([part.score_nats[:-1], whole.score_nats]),
-            np.concatenate([part.row_start[:-2], whole.row_start + kept]),
-            np.concatenate([part.points_m[:kept], whole.points_m]),
-            np.concatenate([part.through_nats[:kept], whole.through_nats]),
+            _joined_alternatives(part.alternatives, whole.alternatives),
         )
     return whole
 
 
-def _cells(field: SearchField) -> IntArray:
-    """Cell (N,) of each bin: stretches of about ``_CELL_M`` of one lane."""
-    graph = field.graph
+def _joined_alternatives(before: Alternatives, after: Alternatives) -> Alternatives:
+    """Those of all samples but the last of ``before``, then those of ``after``."""
+    kept = before.row_start[-2]
+    return Alternatives(
+        np.concatenate([before.row_start[:-2], after.row_start + kept]),
+        np.concatenate([before.points_m[:kept], after.points_m]),
+        np.concatenate([before.through_nats[:kept], after.through_nats]),
+    )
+
+
+def _cells(problem: SearchProblem) -> IntArray:
+    """Cell (N,) of each bin: every lane is cut into cells of about ``_CELL_M``."""
+    graph = problem.graph
     start = graph.lane_start[graph.lane]
-    cells: IntArray = start + (np.arange(graph.bin_count, dtype=np.int32) - start) // max(round(_CELL_M / field.bin_m), 1)
+    cells: IntArray = start + (np.arange(graph.bin_count, dtype=np.int32) - start) // max(round(_CELL_M / problem.bin_m), 1)
     return cells

@@ -1,80 +1,98 @@
-"""What the route search runs on: the drive, the lane graph, the scales, as the compiled kernel takes them."""
+"""What the route search runs on: the drive, the lane graph and the scales, and the same as the compiled search takes them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hippodrome.core.matching.search.config import OffNetworkCosts, RouteSearchConfig, SearchCosts
-from hippodrome.core.matching.search.hypotheses import OffRows, Rows
+from hippodrome.core.matching.search.hypotheses import Hypotheses, Places
+from hippodrome.core.matching.search.model import Drive, GraphTables, OffNetworkModel, SearchModel, StepCosts
 from hippodrome.core.matching.search.track import (
     Track,
-    driven,
+    driven_arc,
     make_track,
     scale_range,
 )
-from hippodrome.core.roads.lane_graph import LaneGraph, bin_cells, build_lane_graph
+from hippodrome.core.roads.lane_graph import LaneGraph, bin_grid, build_lane_graph
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, Visits
 
 
-class Seeds(NamedTuple):
-    """Hypotheses that a search begins with."""
+class InitialHypotheses(NamedTuple):
+    """Hypotheses that a search begins with, and the places of those off the network."""
 
-    rows: Rows
-    off_rows: OffRows
+    hypotheses: Hypotheses
+    places: Places
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SearchField:
+class SearchProblem:
+    """A drive to be matched, and the discretised states that it may pass through: bins of lanes times scales."""
+
     network: RoadNetwork
     track: Track
-    log_scale: FloatArray  # (K,) centres of the scale bins, ln(metres per map unit)
+    log_scale: FloatArray  # (K,) centres of the scale bins, ln(metres per map unit), ascending
     graph: LaneGraph
     costs: SearchCosts
     off_network: OffNetworkCosts
     bin_m: float
 
 
-def search_field(visits: Visits, network: RoadNetwork, config: RouteSearchConfig) -> SearchField:
-    """Fine bins over the whole network, and the drive in steps of about ``step_m``."""
+def search_problem(visits: Visits, network: RoadNetwork, config: RouteSearchConfig) -> SearchProblem:
+    """The whole network in fine bins, all scales that the drive's speeds allow, and the drive in steps of about ``step_m``."""
     low, typical, high = scale_range(visits, network)
     log_scale = np.arange(np.log(low), np.log(high) + config.scale_bin, config.scale_bin)
-    track = make_track(visits, min(config.step_m / typical, 0.25 * driven(visits)[-1]))
+    track = make_track(visits, min(config.step_m / typical, 0.25 * driven_arc(visits)[-1]))
     graph = build_lane_graph(network, track.step * np.exp(log_scale[-1]) + 4.0 * config.bin_m, config.bin_m)
-    return SearchField(network, track, log_scale, graph, config.costs, config.off_network, config.bin_m)
+    return SearchProblem(network, track, log_scale, graph, config.costs, config.off_network, config.bin_m)
 
 
-class KernelArguments(NamedTuple):
-    """What both passes of the compiled search take, in its order."""
+def compiled_drive(problem: SearchProblem, heading_rad: FloatArray, place_prior: FloatArray | None = None) -> Drive:
+    """The drive as the compiled search takes it.
 
-    heading_rad: FloatArray
-    places: FloatArray  # (T, 3) x, y, 1/sigma^2 of what is known of the place at each heading
-    step: float
-    scales: FloatArray
-    tables: tuple[Any, ...]
-    costs: tuple[Any, ...]
-    off: tuple[Any, ...]
+    Args:
+        problem: tells the length of a step.
+        heading_rad: (T,) by odometry: those of the problem's track, or a part of them, perhaps backwards.
+        place_prior: (T, 3) x, y and 1/sigma^2 of what is known of the place at each sample.
+    """
+    nothing_known = np.zeros((len(heading_rad), 3))
+    return Drive(np.ascontiguousarray(heading_rad), nothing_known if place_prior is None else place_prior, problem.track.step)
 
 
-def kernel_arguments(field: SearchField, heading_rad: FloatArray, places: FloatArray | None = None) -> KernelArguments:
-    graph, costs, off = field.graph, field.costs, field.off_network
-    tables = graph.reach_start, graph.reach_bin, graph.reach_m, graph.reach_changes, graph.heading_rad, graph.lane, graph.points_m
-    on_road = (
-        costs.heading_sigma_rad, costs.heading_limit_nats, costs.offset_gain, 0.5 * field.bin_m, costs.length_sigma_m,
-        costs.scale_step_nats, costs.scale_jump_nats, costs.lane_change_nats,
-    )  # fmt: skip
-    cells = bin_cells(graph)
-    grid = graph.points_m, cells.start, cells.bin, cells.origin_m[0], cells.origin_m[1], cells.size_m, cells.columns, cells.rows
-    off_road = off.return_nats, off.drift, off.turn_limit_rad, off.leave_nats, off.step_nats, off.spread_nats
-    return KernelArguments(
-        np.ascontiguousarray(heading_rad),
-        np.zeros((len(heading_rad), 3)) if places is None else places,
-        field.track.step,
-        np.exp(field.log_scale),
-        tables,
-        on_road,
-        (*grid, *off_road),
+def compiled_model(problem: SearchProblem) -> SearchModel:
+    """Lane graph, scales and costs as the compiled search takes them."""
+    graph, costs, off = problem.graph, problem.costs, problem.off_network
+    return SearchModel(
+        scales=np.exp(problem.log_scale),
+        graph=GraphTables(
+            reach_start=graph.reach_start,
+            reach_bin=graph.reach_bin,
+            reach_m=graph.reach_m,
+            lane_changes=graph.reach_changes,
+            heading_rad=graph.heading_rad,
+            lane=graph.lane,
+            points_m=graph.points_m,
+        ),
+        costs=StepCosts(
+            heading_sigma_rad=costs.heading_sigma_rad,
+            heading_limit_nats=costs.heading_limit_nats,
+            offset_gain=costs.offset_gain,
+            half_bin_m=0.5 * problem.bin_m,
+            length_sigma_m=costs.length_sigma_m,
+            scale_step_nats=costs.scale_step_nats,
+            scale_jump_nats=costs.scale_jump_nats,
+            lane_change_nats=costs.lane_change_nats,
+        ),
+        off_network=OffNetworkModel(
+            grid=bin_grid(graph),
+            return_nats=off.return_nats,
+            drift=off.drift,
+            turn_limit_rad=off.turn_limit_rad,
+            leave_nats=off.leave_nats,
+            step_nats=off.step_nats,
+            spread_nats=off.spread_nats,
+        ),
     )

@@ -1,7 +1,9 @@
 """Route search: a hidden Markov model over (position on the lane graph) x (log scale), with unknown start and scale.
 
-It sees the raw motions only, so false loop closures cannot hurt it. ``route_start`` tells how an unknown start is found; from
-there, 1 m bins are searched over the whole drive.
+It is Viterbi map matching in the manner of P. Newson and J. Krumm, "Hidden Markov map matching through noise and sparseness",
+2009, but what is observed is motion instead of positions: the heading and length of each step. It sees the raw motions only, so
+that false loop closures cannot hurt it. ``starts`` tells how an unknown start is found; from there, bins of 1 m are searched over
+the whole drive.
 """
 
 from __future__ import annotations
@@ -12,24 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hippodrome.core.matching.search.config import RouteSearchConfig
-from hippodrome.core.matching.search.passes import best_through
-from hippodrome.core.matching.search.problem import (
-    SearchField,
-    Seeds,
-    kernel_arguments,
-    search_field,
-)
-from hippodrome.core.matching.search.starts import anchors, prior_starts, starts_from
+from hippodrome.core.matching.search.passes import TracedRoute, most_likely_route
+from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, search_problem
+from hippodrome.core.matching.search.starts import anchor_samples, starts_near_pose, starts_without_prior
 from hippodrome.core.matching.search.track import Track
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import Float32Array, FloatArray, HippodromeError, IntArray, StartPose, Visits
 
-_STRETCH = 24  # steps (120 m): single corners must not decide
+_WINDOW = 24  # steps (120 m) over which the score is averaged: single corners must not decide
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RouteAlternatives:
-    """Other places at each moment: sample ``t`` of the track owns rows ``row_start[t]:row_start[t + 1]``."""
+    """Places other than the best route's: sample ``t`` of the track owns rows ``row_start[t]:row_start[t + 1]``."""
 
     row_start: NDArray[np.int64]  # (T + 1,)
     points_m: Float32Array  # (rows, 2)
@@ -38,7 +35,7 @@ class RouteAlternatives:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
-    """The best route through T track samples, and what else was possible."""
+    """The most likely route through the T samples of a track, and the alternatives to it."""
 
     track: Track
     points_m: FloatArray  # (T, 2) on the lane, or dead-reckoned off the network
@@ -47,52 +44,80 @@ class Route:
     log_scale: FloatArray  # (T,) ln(metres per map unit)
     heading_offset_rad: FloatArray  # (T,) network heading minus odometry heading
     score_nats: FloatArray  # (T,) log likelihood of each step
-    total_nats: float
+    total_nats: float  # log likelihood of the whole route
     alternatives: RouteAlternatives
 
     def explained(self, limit_nats: float) -> bool:
-        """Whether no stretch costs as much as driving off the network would."""
-        width = min(_STRETCH, len(self.score_nats))
-        stretches = np.convolve(self.score_nats, np.full(width, 1.0 / width), "valid")
-        return bool(np.all(stretches > -limit_nats) and np.all(self.lane >= 0))
+        """Whether the route is on the network throughout and no window of it costs ``limit_nats`` a step or more."""
+        width = min(_WINDOW, len(self.score_nats))
+        mean_score = np.convolve(self.score_nats, np.full(width, 1.0 / width), "valid")
+        return bool(np.all(mean_score > -limit_nats) and np.all(self.lane >= 0))
 
 
 def search_route(visits: Visits, network: RoadNetwork, config: RouteSearchConfig, start: StartPose | None = None) -> Route:
-    """The most likely drive through the network; ``start`` is only a prior on its first pose.
+    """The most likely drive through the network.
 
-    Without one, the search begins where the drive turns most. Should the answer leave stretches unexplained, it begins elsewhere
-    too (it may have begun on a road that the network lacks), and the answer that explains the whole drive best is kept.
+    Without a start pose the search begins at an anchor, the sample of the drive that most turning follows. Should the answer
+    leave parts of the drive unexplained, other anchors are tried too (the first may lie on a road that the network lacks), and
+    the answer that explains the whole drive best is kept.
+
+    Args:
+        visits: the drive's raw motions, in map units.
+        network: the roads.
+        config: states, bounds and costs.
+        start: a prior on the drive's first pose, in the network frame; the drive need not begin there exactly.
+
+    Raises:
+        HippodromeError: the vehicle never moved, or no route of the network is as long as the drive.
     """
-    field = search_field(visits, network, config)
+    problem = search_problem(visits, network, config)
     if start is not None:
-        return best_route(field, prior_starts(field, start, config), config)
+        return best_route(problem, starts_near_pose(problem, start, config), config)
     routes: list[Route] = []
-    for anchor in anchors(field.track, config.anchors):
-        routes.append(best_route(field, starts_from(field, anchor, config), config))
+    for anchor in anchor_samples(problem.track, config.anchors):
+        routes.append(best_route(problem, starts_without_prior(problem, anchor, config), config))
         if routes[-1].explained(config.off_network.step_nats):
             break
     return max(routes, key=lambda route: route.total_nats)
 
 
-def best_route(field: SearchField, seeds: Seeds, config: RouteSearchConfig, places: FloatArray | None = None) -> Route:
-    """The most likely route from given starts; ``places`` (T, 3): x, y, 1/sigma^2 of what is known of the way."""
-    found = best_through(field, kernel_arguments(field, field.track.heading_rad, places), seeds, config)
-    if found is None:
-        length_m = field.track.arc[-1] * np.exp(np.mean(field.log_scale))
+def best_route(
+    problem: SearchProblem, initial: InitialHypotheses, config: RouteSearchConfig, place_prior: FloatArray | None = None
+) -> Route:
+    """The most likely route from given hypotheses at the drive's first sample.
+
+    Args:
+        problem: the drive, the lane graph, the scales and the costs.
+        initial: hypotheses to begin with.
+        config: bounds of the search.
+        place_prior: (T, 3) x, y and 1/sigma^2 of what is known of the place at each sample of the track.
+
+    Raises:
+        HippodromeError: no route of the network is as long as the drive.
+    """
+    traced = most_likely_route(problem, initial, config, place_prior)
+    if traced is None:
+        length_m = problem.track.arc[-1] * np.exp(np.mean(problem.log_scale))
         raise HippodromeError(
             f"cognitive map: no route of this network is about {length_m:.0f} m long; is it the one that was driven?"
         )
-    graph, rows = field.graph, found.rows
-    on_network, at = rows["bin"] >= 0, np.maximum(rows["bin"], 0)
-    position = np.clip(graph.position_m[at] + rows["rest"], 0.0, field.network.lane_lengths_m()[graph.lane[at]])
+    return _route(problem, traced)
+
+
+def _route(problem: SearchProblem, traced: TracedRoute) -> Route:
+    """The traced hypotheses in terms of lanes and positions on them."""
+    graph, hypotheses = problem.graph, traced.hypotheses
+    on_network, bin_ = hypotheses["bin"] >= 0, np.maximum(hypotheses["bin"], 0)
+    lane = graph.lane[bin_]
+    position = np.clip(graph.position_m[bin_] + hypotheses["remainder_m"], 0.0, problem.network.lane_lengths_m()[lane])
     return Route(
-        track=field.track,
-        points_m=found.places_m,
-        lane=np.where(on_network, graph.lane[at], -1).astype(np.int32),
+        track=problem.track,
+        points_m=traced.points_m,
+        lane=np.where(on_network, lane, -1).astype(np.int32),
         position_m=np.where(on_network, position, np.nan),
-        log_scale=field.log_scale[rows["k"]],
-        heading_offset_rad=rows["offset"].astype(np.float64),
-        score_nats=np.diff(found.score_nats, prepend=0.0),
-        total_nats=float(found.score_nats[-1]),
-        alternatives=RouteAlternatives(found.row_start, found.points_m, found.through_nats),
+        log_scale=problem.log_scale[hypotheses["scale_bin"]],
+        heading_offset_rad=hypotheses["heading_offset_rad"].astype(np.float64),
+        score_nats=np.diff(traced.score_nats, prepend=0.0),
+        total_nats=float(traced.score_nats[-1]),
+        alternatives=RouteAlternatives(*traced.alternatives),
     )

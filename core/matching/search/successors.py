@@ -1,108 +1,142 @@
-"""What one hypothesis may become over one step, compiled: it sees bins, reach tables and costs, and knows no roads."""
+"""One step on the network, compiled: which hypotheses a hypothesis leads to, and at which cost.
+
+Costs are negative log likelihoods in nats: of the heading error and the length error (both normal, the former truncated), of a
+change of scale and of a lane change. The step sees bins and tables only; it knows no roads.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 from numba import njit
-from numpy.typing import NDArray
 
-from hippodrome.core.matching.search.hypotheses import (
-    Costs,
-    Moment,
-    OffNetwork,
-    OffRows,
-    Rows,
-    Tables,
-)
-from hippodrome.core.matching.search.off_network import expand_off, move_off
+from hippodrome.core.matching.search.hypotheses import Hypotheses, Hypothesis, Places, Successors
+from hippodrome.core.matching.search.model import SearchModel, StepCosts, StepObservation
+from hippodrome.core.matching.search.off_network import dead_reckoned, followed_offset, rejoin
 from hippodrome.core.se2 import wrap_near_zero
 
-MOST_SUCCESSORS = 2048  # of one hypothesis: a few bins x scale bins x branches of a junction, or the bins round a place
-_FARTHEST_JUMP = 12  # scale bins: 50 % either way
-_JUMP_SPREAD = 2.0  # nats; only hypotheses this close to the best may jump in scale, and only if they are few
-_MOST_JUMPING = 200
+MOST_SUCCESSORS = 2048  # of one hypothesis: a few bins x scale bins x branches of a junction, or the bins around a place
+_FARTHEST_JUMP = 12  # scale bins of the largest jump in scale: 50 % either way
+_JUMP_SPREAD = 2.0  # only hypotheses this close to the best (nats) may jump in scale ...
+_MOST_JUMPING = 200  # ... and only if they are no more than this
 
 
-@njit(cache=True, error_model="numpy")
-def expand(
-    row: Any, moment: Moment, scales: NDArray[Any], tables: Tables, costs: Costs, jumps: bool, most_cost: float, out: NDArray[Any]
-) -> int:
-    """Successors of one hypothesis on the network over one step, counted: those that cost at most ``most_cost``.
+class _Prediction(NamedTuple):
+    """Where a hypothesis is expected to be after the step, for one choice of the next scale bin."""
 
-    Rows of ``out``: bin, scale bin, log likelihood, offset, rest. A bin either side of the predicted length is tried, for
-    corners cut or swung out. ``jumps``: the scale may jump.
-    """
-    start, reach_bin, reach_m, reach_changes, bin_heading, _, points = tables
-    sigma, limit, gain, half, length_sigma, scale_cost, jump_cost, change_cost = costs
-    heading, _, step, place_x, place_y, place_weight = moment
-    offset, rest, own_k = float(row.offset), float(row.rest), row.k
-    course, per_sigma, per_length, most_turn = heading + offset, 1.0 / sigma, 1.0 / length_sigma, 3.0 * sigma
-    low, last = start[row.bin], start[row.bin + 1]
-    farthest = _FARTHEST_JUMP if jumps else 1
-    count = 0
-    for k in range(max(own_k - farthest, 0), min(own_k + farthest + 1, scales.shape[0])):
-        move_cost = min(scale_cost * abs(k - own_k), jump_cost)
-        if move_cost > most_cost:
-            continue
-        ahead = step * scales[k] + rest
-        window = 3.0 * half if k == own_k else half
-        while low < last and reach_m[low] < ahead - 3.0 * half:  # scales grow: what lies before one lies before the next
-            low += 1
-        for r in range(low, last):
-            error = ahead - reach_m[r]
-            if error < -window:
-                break
-            if error > window:
-                continue
-            target = reach_bin[r]
-            beyond, turn = (abs(error) - half) * per_length, wrap_near_zero(bin_heading[target] - course)
-            cost = move_cost + change_cost * reach_changes[r] + min(0.5 * (turn * per_sigma) ** 2, limit)
-            if beyond > 0.0:
-                cost += 0.5 * beyond * beyond
-            if place_weight > 0.0:
-                away_sq = (points[target, 0] - place_x) ** 2 + (points[target, 1] - place_y) ** 2
-                cost += min(0.5 * place_weight * away_sq, limit)
-            if cost > most_cost:
-                continue
-            if count == out.shape[0]:
-                return count
-            out[count, 0] = target
-            out[count, 1] = k
-            out[count, 2] = -cost
-            out[count, 3] = wrap_near_zero(offset + gain * min(max(turn, -most_turn), most_turn))
-            out[count, 4] = min(max(error, -half), half)
-            count += 1
-    return count
+    scale_bin: int
+    cost_nats: float  # cost of the change of scale
+    ahead_m: float  # driven length from the centre of the present bin
+    tolerance_m: float  # bins that are off by more are not tried
+    heading_offset_rad: float
+    heading_rad: float  # expected heading on the network
+    first: int  # rows first:last of the reach table may be near enough
+    last: int
 
 
 @njit(cache=True, error_model="numpy")
 def successors(
-    row: Any, off_rows: OffRows, moment: Moment, scales: NDArray[Any], tables: Tables, costs: Costs, off: OffNetwork,
-    jumps: bool, most_cost: float, out: NDArray[Any],
+    hypothesis: Hypothesis, places: Places, observation: StepObservation, model: SearchModel, may_jump: bool, most_cost: float,
+    out: Successors,
 ) -> int:  # fmt: skip
-    """Where one hypothesis, on the network or off it, may be on the network a step later; rows of ``out`` as in ``expand``."""
-    if row.bin >= 0:
-        return expand(row, moment, scales, tables, costs, jumps, most_cost, out)
-    x, y, away = move_off(row, off_rows, moment, scales, off[0])
-    return expand_off(x, y, away, row.k, row.offset, moment[0], tables, costs, off, out)
+    """Successors on the network of one hypothesis, on the network or off it: writes them into ``out``, returns their number."""
+    if hypothesis.bin >= 0:
+        return expand(hypothesis, observation, model, may_jump, most_cost, out)
+    return rejoin(hypothesis, dead_reckoned(hypothesis, places, observation, model), observation, model, out)
 
 
 @njit(cache=True, error_model="numpy")
-def jump_bar(rows: Rows) -> tuple[float, int]:
-    """The score from which on hypotheses may jump in scale, infinite while too many are as good; and which row is best."""
-    lead = 0
-    for i in range(rows.shape[0]):
-        lead = i if rows[i].score > rows[lead].score else lead
-    bar = rows[lead].score - _JUMP_SPREAD
+def expand(
+    hypothesis: Hypothesis, observation: StepObservation, model: SearchModel, may_jump: bool, most_cost: float, out: Successors
+) -> int:
+    """Successors of one hypothesis on the network that cost at most ``most_cost``: writes them into ``out``, counted.
+
+    The scale may change by one bin, or by many if ``may_jump``. At the present scale a bin either side of the predicted one is
+    tried too, for corners cut or swung out.
+    """
+    own, remainder = hypothesis.scale_bin, float(hypothesis.remainder_m)
+    offset = float(hypothesis.heading_offset_rad)
+    graph, costs, scales = model.graph, model.costs, model.scales
+    first, last = graph.reach_start[hypothesis.bin], graph.reach_start[hypothesis.bin + 1]
+    farthest = _FARTHEST_JUMP if may_jump else 1
     count = 0
-    for i in range(rows.shape[0]):
-        count += rows[i].score >= bar
-    return (bar if count <= _MOST_JUMPING else math.inf), lead
+    for scale_bin in range(max(own - farthest, 0), min(own + farthest + 1, scales.shape[0])):
+        cost = min(costs.scale_step_nats * abs(scale_bin - own), costs.scale_jump_nats)
+        if cost > most_cost:
+            continue
+        ahead = observation.step * scales[scale_bin] + remainder
+        tolerance = 3.0 * costs.half_bin_m if scale_bin == own else costs.half_bin_m
+        while first < last and graph.reach_m[first] < ahead - 3.0 * costs.half_bin_m:
+            first += 1  # scales ascend, so that what is too near for this one is too near for the next
+        heading = observation.heading_rad + offset
+        prediction = _Prediction(scale_bin, cost, ahead, tolerance, offset, heading, first, last)
+        count = _append_reached(prediction, observation, model, most_cost, out, count)
+    return count
 
 
 @njit(cache=True, error_model="numpy")
-def moment_at(headings: NDArray[Any], places: NDArray[Any], step: float, t: int) -> Moment:
-    """What is known of the step that ends at sample ``t``: heading there and on the way, length, place (weight 0: none)."""
-    return headings[t], 0.5 * (headings[t - 1] + headings[t]), step, places[t, 0], places[t, 1], places[t, 2]
+def _append_reached(
+    prediction: _Prediction, observation: StepObservation, model: SearchModel, most_cost: float, out: Successors, count: int
+) -> int:
+    """Append to ``out`` the bins near the prediction that cost at most ``most_cost``; returns the new number of rows."""
+    graph, costs = model.graph, model.costs
+    for r in range(prediction.first, prediction.last):
+        error = prediction.ahead_m - graph.reach_m[r]
+        if error < -prediction.tolerance_m:
+            break
+        if error > prediction.tolerance_m:
+            continue
+        target = graph.reach_bin[r]
+        turn = wrap_near_zero(graph.heading_rad[target] - prediction.heading_rad)
+        cost = prediction.cost_nats + costs.lane_change_nats * graph.lane_changes[r] + _heading_cost(turn, costs)
+        cost += _length_cost(error, costs)
+        cost += _place_cost(graph.points_m[target, 0], graph.points_m[target, 1], observation, costs)
+        if cost > most_cost:
+            continue
+        if count == out.shape[0]:
+            return count
+        successor = out[count]
+        successor.bin, successor.scale_bin, successor.log_likelihood = target, prediction.scale_bin, -cost
+        successor.heading_offset_rad = followed_offset(prediction.heading_offset_rad, turn, costs)
+        successor.remainder_m = min(max(error, -costs.half_bin_m), costs.half_bin_m)
+        count += 1
+    return count
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _heading_cost(turn_rad: float, costs: StepCosts) -> float:
+    """Cost of a difference between the lane's heading and the predicted one."""
+    return min(0.5 * (turn_rad * (1.0 / costs.heading_sigma_rad)) ** 2, costs.heading_limit_nats)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _length_cost(error_m: float, costs: StepCosts) -> float:
+    """Cost of a difference between the driven length and the length along the lanes; half a bin either way is free."""
+    beyond = (abs(error_m) - costs.half_bin_m) * (1.0 / costs.length_sigma_m)
+    return 0.5 * beyond * beyond if beyond > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _place_cost(x_m: float, y_m: float, observation: StepObservation, costs: StepCosts) -> float:
+    """Cost of the distance from the known place, if one is known."""
+    if observation.place_weight > 0.0:
+        away_sq = (x_m - observation.x_m) ** 2 + (y_m - observation.y_m) ** 2
+        return min(0.5 * observation.place_weight * away_sq, costs.heading_limit_nats)
+    return 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def jump_bar(hypotheses: Hypotheses) -> tuple[float, int]:
+    """Who may jump in scale, and who is best: the least score from which on hypotheses may jump, and the index of the best one.
+
+    The score is infinite while too many hypotheses are about as good: jumps would multiply them.
+    """
+    lead = 0
+    for i in range(hypotheses.shape[0]):
+        lead = i if hypotheses[i].score_nats > hypotheses[lead].score_nats else lead
+    bar = hypotheses[lead].score_nats - _JUMP_SPREAD
+    count = 0
+    for i in range(hypotheses.shape[0]):
+        count += hypotheses[i].score_nats >= bar
+    return (bar if count <= _MOST_JUMPING else math.inf), lead

@@ -1,44 +1,53 @@
-"""The drive as the matching sees it: raw consecutive motions turned into headings at even arc lengths."""
+"""The drive as the route search sees it: raw consecutive motions turned into headings at even arc lengths."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, Visits
 
-WANDER = 1.5  # factor by which the scale may leave its usual value for a while, as after a re-start of visual odometry
+WANDER = 1.5  # factor by which the scale may leave its usual value for a while, as after a restart of visual odometry
 WIDE_SCALES = (0.1, 1.0, 10.0)  # metres per map unit tried when the visits carry no usable time
+_BRISK_PERCENTILE = 90.0  # brisk speed of a drive among its speeds while moving: stops and jams do not lower it much
+_BRISK_SHARES = (0.25, 1.3)  # brisk speed over the network's speed limits: an anxious driver in a jam, a reckless one
 
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """T samples, ``step`` map units of driving apart. Stops and uneven vertex spacing are gone, translation and rotation too."""
+    """A drive sampled at T even arc lengths, ``step`` map units apart.
+
+    Stops and uneven spacing of the visits are gone, and so are the map's translation and rotation.
+    """
 
     arc: FloatArray  # (T,) map units driven since the first visit
     heading_rad: FloatArray  # (T,) unwrapped, zero at the first visit
-    visit_arc: FloatArray  # (S,) where each visit lies on that axis
+    visit_arc: FloatArray  # (S,) arc length at which each visit lies
     step: float
 
-    def visit_samples(self) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    def visit_samples(self) -> NDArray[np.int64]:
         """The sample (S,) nearest to each visit."""
         return np.clip(np.round(self.visit_arc / self.step).astype(np.int64), 0, len(self.arc) - 1)
 
 
 def make_track(visits: Visits, step: float) -> Track:
-    """Sample the visits' motions every ``step`` map units."""
-    visit_arc = driven(visits)
+    """Sample the motions of S visits every ``step`` map units."""
+    visit_arc = driven_arc(visits)
     heading = np.cumsum(visits.motion[:, 2])
     arc = np.arange(0.0, visit_arc[-1] + 0.5 * step, step)
-    moved = np.concatenate([[True], np.diff(visit_arc) > 0.0])  # of a standstill the last heading counts
-    last = np.concatenate([np.flatnonzero(moved)[1:] - 1, [len(moved) - 1]])
-    return Track(arc, np.interp(arc, visit_arc[last], heading[last]), visit_arc, step)
+    moved = np.concatenate([[True], np.diff(visit_arc) > 0.0])
+    last_of_stop = np.concatenate([np.flatnonzero(moved)[1:] - 1, [len(moved) - 1]])  # of a stop, the last heading counts
+    return Track(arc, np.interp(arc, visit_arc[last_of_stop], heading[last_of_stop]), visit_arc, step)
 
 
-def driven(visits: Visits) -> FloatArray:
-    """Arc length (S,) driven up to each visit, map units; a motion's chord is lengthened to the circular arc of its turn."""
+def driven_arc(visits: Visits) -> FloatArray:
+    """Arc length (S,) driven up to each visit, map units.
+
+    A motion is the chord of the way between two visits; it is lengthened to the circular arc that its turn tells.
+    """
     half_turn = 0.5 * np.clip(np.abs(visits.motion[:, 2]), 0.0, np.pi)
     chord = np.hypot(visits.motion[:, 0], visits.motion[:, 1])
     arc: FloatArray = np.cumsum(chord / np.sinc(half_turn / np.pi))
@@ -46,18 +55,20 @@ def driven(visits: Visits) -> FloatArray:
 
 
 def scale_range(visits: Visits, network: RoadNetwork) -> tuple[float, float, float]:
-    """Least, typical and largest possible metres per map unit: a driver's brisk speed is 25-130 % of the network's limits.
+    """Least, typical and largest possible metres per map unit, from the drive's brisk speed and the network's speed limits.
 
-    Brisk: the 90th percentile of the speeds while moving, in map units; stops and jams do not lower it much.
+    Raises:
+        HippodromeError: the vehicle never moved.
     """
-    seconds, units = np.diff(visits.t_s), np.diff(driven(visits))
+    seconds, units = np.diff(visits.t_s), np.diff(driven_arc(visits))
     moving = (seconds > 0.0) & (units > 0.0)
     if not np.any(units > 0.0):
         raise HippodromeError("cognitive map: the vehicle never moved, so there is no route to match; record a longer drive")
     if not np.any(moving):
         return WIDE_SCALES
     speed = units[moving] / seconds[moving]
-    brisk = float(np.percentile(speed, 90.0))
+    brisk = float(np.percentile(speed, _BRISK_PERCENTILE))
     limit = network.speed_limit_mps[~network.is_internal]
     usual = float(np.median(limit))
-    return 0.25 / WANDER * usual / brisk, usual / brisk, 1.3 * WANDER * float(np.max(limit)) / brisk
+    slowest, fastest = _BRISK_SHARES
+    return slowest / WANDER * usual / brisk, usual / brisk, fastest * WANDER * float(np.max(limit)) / brisk

@@ -4,7 +4,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from hippodrome.core.roads.lane_graph import (
-    bin_cells,
+    bin_grid,
     build_lane_graph,
     mirrored,
     reversed_network,
@@ -54,6 +54,14 @@ def test_lane_changes_lead_to_direct_neighbours_only():
     bins, metres, changes = reach(graph, 0)
     assert sorted(zip(graph.lane[bins].tolist(), changes.tolist(), strict=True)) == [(0, 0)] * 3 + [(1, 1)] * 3
     np.testing.assert_allclose(metres, [1, 1, 2, 2, 3, 3], atol=1e-6)
+
+
+def test_a_lane_change_scales_the_position_by_the_lengths():
+    """In a bend the inner lane is half as long: from 5.5 of 10 m one enters it at 2.75 of 5 m."""
+    bend = lanes_network([[(0, 0), (10, 0)], [(0, 3), (5, 3)]], [[], []], left=[1, -1], right=[-1, 0])
+    graph = build_lane_graph(bend, reach_limit_m=1.0)
+    bins, metres, changes = reach(graph, 5)
+    assert sorted(zip(bins.tolist(), metres.round(6).tolist(), changes.tolist(), strict=True)) == [(6, 1.0, 0), (13, 0.75, 1)]
 
 
 def test_dead_ends_and_loops_end_the_walk():
@@ -112,9 +120,9 @@ def test_the_reversed_network_covers_the_same_places_the_other_way():
 
 def test_every_bin_lies_in_its_cell():
     graph = build_lane_graph(grid_network(np.random.default_rng(3), columns=3, rows=2), 5.0)
-    cells = bin_cells(graph, 10.0)
-    assert sorted(cells.bin.tolist()) == list(range(graph.bin_count))
-    for cell in range(0, cells.rows * cells.columns, 7):
-        inside = graph.points_m[cells.bin[cells.start[cell] : cells.start[cell + 1]]]
-        column_row = np.floor((inside - cells.origin_m) / 10.0)
-        assert np.all(column_row == [cell % cells.columns, cell // cells.columns])
+    grid = bin_grid(graph, 10.0)
+    assert sorted(grid.bin.tolist()) == list(range(graph.bin_count))
+    for cell in range(0, grid.rows * grid.columns, 7):
+        inside = graph.points_m[grid.bin[grid.start[cell] : grid.start[cell + 1]]]
+        column_row = np.floor((inside - grid.origin_m) / 10.0)
+        assert np.all(column_row == [cell % grid.columns, cell // grid.columns])

@@ -1,0 +1,116 @@
+"""How far a matched route can be trusted, segment by segment, and what is reported where it cannot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hippodrome.core.matching.search.route import Route, RouteAlternatives
+from hippodrome.core.matching.segments import consistent_with_closures, route_segments, significant_segments
+from hippodrome.core.roads.network import BoolArray
+from hippodrome.core.types import Edges, FloatArray, MatchBreak, MatchStatus, UInt8Array
+
+
+@dataclass(frozen=True, slots=True)
+class ConfidenceConfig:
+    """When a sample of the route counts as matched."""
+
+    distant_m: float = 30.0  # an alternative route farther away than this is at another place
+    least_gap_nats: float = 8.0  # lead of the route over the best alternative at another place: odds of 3,000 to 1
+    window: int = 24  # steps (120 m) over which the score is averaged: single corners must not decide
+    least_score_nats: float = -1.5  # least mean score of a step, as low as off the network; a right route has -0.1 to -0.4
+    turning_nats: float = 6.0  # log-odds for each rad that the road turns with the vehicle: 1 in 20 steps has a turn, 1 of 3 fits
+    least_evidence_nats: float = 10.0  # least log-odds of a segment in 500 m of driving; chance has up to 7, a right one 6-21
+    evidence_growth_nats: float = 6.0  # that times ln(length / 500 m) more; in 3.5 km chance has up to 15, a right one 40-300
+    least_joined_nats: float = 6.0  # least log-odds of a segment that dead reckoning joins to a certain one
+    least_votes: int = 6  # loop closures that concern a segment, from which on they may vote it down
+    least_agreeing: float = 0.34  # share of them that must agree with it: 5 of 6 are false once in 600 times if 20 % are
+    most_moved_m: float = 12.0  # a vertex that the refinement moves farther is ambiguous; a right search errs by up to 7 m
+
+
+def distant_gap(points_m: FloatArray, alternatives: RouteAlternatives, distant_m: float) -> FloatArray:
+    """By how many nats (T,) the best complete route leads the best one that is at another place at that sample.
+
+    The gap is between complete routes, so that evidence from before and after the sample counts. Where the search's margin holds
+    no alternative at another place, the gap is at least that margin and returned as inf.
+
+    Args:
+        points_m: (T, 2) the best route.
+        alternatives: the alternatives at its T samples, the best route among them.
+        distant_m: alternatives farther away than this are at another place.
+    """
+    rows = np.diff(alternatives.row_start)
+    away = alternatives.points_m - np.repeat(points_m, rows, axis=0).astype(np.float32)
+    distant = np.where(np.sum(away**2, axis=1) > distant_m**2, alternatives.through_nats, -np.inf)
+    best = np.max(alternatives.through_nats[alternatives.row_start[-2] :])
+    rival = np.maximum.reduceat(distant, alternatives.row_start[:-1])
+    gap: FloatArray = np.where(rival > -1e29, best - rival, np.inf)
+    return gap
+
+
+def match_status(route: Route, config: ConfidenceConfig, closures: Edges | None = None, start_known: bool = False) -> UInt8Array:
+    """MatchStatus (T,) of each sample of the track.
+
+    Args:
+        route: the matched route over T samples.
+        config: the thresholds.
+        closures: loop closures between visits, which vote on the segments of the route.
+        start_known: whether a start pose was given.
+    """
+    gap = distant_gap(route.points_m, route.alternatives, config.distant_m)
+    explained = _explained(route, config)
+    status = np.where(gap < config.least_gap_nats, MatchStatus.AMBIGUOUS, MatchStatus.MATCHED)
+    status[~explained] = MatchStatus.OFF_NETWORK
+    segments = route_segments(route, explained, config.turning_nats)
+    growth = float(np.log(max(len(gap) / 100.0, 1.0)))  # the score that chance reaches grows with the length of the drive
+    least = config.least_evidence_nats + config.evidence_growth_nats * growth
+    kept = significant_segments(segments, least, config.least_joined_nats, start_known)
+    if closures is not None:
+        kept = consistent_with_closures(kept, route, closures, config.distant_m, config.least_votes, config.least_agreeing)
+    for segment in segments:
+        if segment not in kept:  # beside segments that are certain, it is no road of the network; alone, it may be anywhere
+            status[segment.first : segment.end] = MatchStatus.OFF_NETWORK if kept else MatchStatus.AMBIGUOUS
+    return status.astype(np.uint8)
+
+
+def _explained(route: Route, config: ConfidenceConfig) -> BoolArray:
+    """Samples (T,) on the network around which the mean score of a step is high enough."""
+    width = min(config.window, len(route.score_nats))
+    kernel = np.ones(width)
+    score = np.convolve(route.score_nats, kernel, "same") / np.convolve(np.ones(len(route.score_nats)), kernel, "same")
+    explained: BoolArray = (route.lane >= 0) & (score >= config.least_score_nats)
+    return explained
+
+
+def reject_displaced(status: UInt8Array, route: Route, poses: FloatArray, config: ConfidenceConfig) -> UInt8Array:
+    """Status (S,) with the matched visits made ambiguous that the refinement moved too far: search and refinement disagree.
+
+    Args:
+        status: (S,) MatchStatus of each visit by the search.
+        route: the route that the search found.
+        poses: (S, 3) refined poses of the visits.
+        config: how far a visit may be moved.
+    """
+    track = route.track
+    found = np.column_stack([np.interp(track.visit_arc, track.arc, route.points_m[:, axis]) for axis in (0, 1)])
+    displaced = np.hypot(*(poses[:, :2] - found).T) > config.most_moved_m
+    return np.where(displaced & (status == MatchStatus.MATCHED), MatchStatus.AMBIGUOUS, status).astype(np.uint8)
+
+
+CAUSES = {
+    MatchStatus.AMBIGUOUS: "another route, or chance, explains the drive about as well; drive farther or give a start pose",
+    MatchStatus.OFF_NETWORK: "no road of the network explains the drive here",
+    MatchStatus.NO_ROUTE: "no route leads from the last matched place to the next",
+}
+
+
+def match_breaks(status: UInt8Array) -> tuple[MatchBreak, ...]:
+    """Runs of unmatched vertices with the same status, from the status (V,) of each vertex."""
+    edges = np.flatnonzero(np.diff(status.astype(np.int16))) + 1
+    starts, ends = np.concatenate([[0], edges]), np.concatenate([edges, [len(status)]])
+    return tuple(
+        MatchBreak(int(first), int(end) - 1, MatchStatus(int(status[first])), CAUSES[MatchStatus(int(status[first]))])
+        for first, end in zip(starts, ends, strict=True)
+        if status[first] != MatchStatus.MATCHED
+    )

@@ -2,11 +2,13 @@
 
 import json
 import shutil
+import subprocess
 import zipfile
 
 import numpy as np
 import pytest
 
+from benchmarks.same import commits
 from benchmarks.same.__main__ import BAD_INPUT, DIFFERENT, SAME, main
 from hippodrome.proto.codec import load_map, save_map
 from tests.eval.exchange.results import make_run
@@ -176,3 +178,24 @@ def test_bad_input_is_one_line_and_status_2(original, copy, tmp_path, capsys):
     assert status == BAD_INPUT
     assert "topometric-default.pbstream" in text
     assert main(["no-such-commit", "HEAD", "--commits"]) == BAD_INPUT
+
+
+def test_two_commits_are_cloned_set_up_run_and_compared(tmp_path, monkeypatch, capsys):
+    """On a repository whose command writes one figure, the number in its file."""
+    repository = tmp_path / "repository"
+    repository.mkdir()
+    (repository / "Makefile").write_text("setup:\n\tmkdir -p .venv/bin && cp command .venv/bin/hippodrome\n")
+    (repository / "command").write_text('#!/bin/sh\nfor out; do :; done\nmkdir -p "$out" && cp figure.json "$out/results.json"\n')
+    (repository / "command").chmod(0o755)
+    git = ["git", "-c", "user.name=one", "-c", "user.email=one@example.org", "-C", str(repository)]
+    subprocess.run([*git, "init", "--quiet"], check=True)
+    for figure, name in (("1.5", "first"), ("1.5", "same"), ("1.6", "other")):
+        (repository / "figure.json").write_text(f'{{"ape": {figure}, "timings": "{name}"}}')
+        subprocess.run([*git, "add", "--all"], check=True)
+        subprocess.run([*git, "commit", "--quiet", "--allow-empty", "--message", name], check=True)
+        subprocess.run([*git, "tag", name], check=True)
+    monkeypatch.setattr(commits, "REPOSITORY", repository)
+    assert main(["first", "same", "--commits"]) == SAME
+    assert main(["first", "other", "--commits", "--keep", str(tmp_path / "kept")]) == DIFFERENT
+    assert "eval/results.json: ape: 1.5 -> 1.6" in capsys.readouterr().out
+    assert len(list((tmp_path / "kept").glob("*/results/*/results.json"))) == 2 * len(commits.RUNS)

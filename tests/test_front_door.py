@@ -95,7 +95,7 @@ def _dataclasses():
                 yield thing
 
 
-@pytest.mark.parametrize("kind", _dataclasses(), ids=lambda kind: kind.__qualname__)
+@pytest.mark.parametrize("kind", list(_dataclasses()), ids=lambda kind: kind.__qualname__)
 def test_no_dataclass_of_core_compares_arrays(kind):
     """``==`` between arrays is an array, which is neither true nor false."""
     holds_arrays = any("Array" in str(field.type) or "ndarray" in str(field.type) for field in dataclasses.fields(kind))

@@ -43,7 +43,10 @@ NOT_MOVED = Step(0.0, 0.0)
 
 
 def localize(
-    observations: Iterable[Observation], cognitive_map: CognitiveMap, network: RoadNetwork | None, config: LocalizerConfig
+    observations: Iterable[Observation],
+    cognitive_map: CognitiveMap,
+    network: RoadNetwork | None = None,
+    config: LocalizerConfig = LocalizerConfig(),
 ) -> list[LocalizationEstimate]:
     """Localize a whole drive from an unknown start.
 
@@ -69,7 +72,9 @@ class Localizer:
     Args and errors are those of ``localize``.
     """
 
-    def __init__(self, cognitive_map: CognitiveMap, network: RoadNetwork | None, config: LocalizerConfig) -> None:
+    def __init__(
+        self, cognitive_map: CognitiveMap, network: RoadNetwork | None = None, config: LocalizerConfig = LocalizerConfig()
+    ) -> None:
         if cognitive_map.frame != "network" or len(cognitive_map.poses) == 0:
             raise HippodromeError(
                 f"localization needs a map in the network frame with vertices, got frame {cognitive_map.frame!r} with "

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 import pytest
 
 from benchmarks.same.__main__ import _parser as parser_of_same
-from hippodrome.eval.cli import _parser, main
+from hippodrome.eval.cli import main, make_parser
 from hippodrome.eval.sweep.grid import make_grid, parse_parameter
 from tests.docs.documents import ROOT, documents
 
@@ -81,7 +81,7 @@ def _choices(text):
 def parsers():
     """The parser of each command, by its words: ``eval``, ``scenario new``."""
     found = {}
-    waiting = [((), _parser())]
+    waiting = [((), make_parser())]
     while waiting:
         words, parser = waiting.pop()
         actions = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]

@@ -12,21 +12,24 @@ The status is read off the fix and the standard deviation of the position (``sta
     UNKNOWN     no pose was adopted yet
     LOST        the position is known to ``lost_sigma_m`` or worse
     DOUBTED     dead reckoning has led off all roads; or the believed place is not like what is seen (z-score below ``seen_z``);
-                or the challenger's evidence has reached ``doubt_evidence`` and the incumbent's
+                or the challenger's evidence has reached both ``doubt_evidence`` and the incumbent's
     OFF_MAP     no view cell of the map lies around the believed place
     LOCALIZED   none of the above
 
-What leads from one status to another:
+What leads from one status to another; nothing leads back to UNKNOWN:
 
-    from                 to          when
-    UNKNOWN              LOCALIZED   a challenger's evidence reaches ``fix_evidence``: it is adopted
-    LOCALIZED            OFF_MAP     the vehicle leaves the mapped roads on roads of the network
-    OFF_MAP              LOCALIZED   it comes back to a mapped road
-    LOCALIZED, OFF_MAP   DOUBTED     views vouch for another place, or do not show the believed one; or there is no road there
-    DOUBTED              LOCALIZED   a view agrees with the incumbent; or the challenger's evidence fades; or the believed place
-                                     is seen again; or the challenger reaches ``fix_evidence`` and the incumbent's, and is adopted
-    all but UNKNOWN      LOST        too much was driven since a view agreed
-    LOST                 LOCALIZED   a view agrees with the incumbent, or a challenger is adopted
+    from                 to                   when
+    UNKNOWN              LOCALIZED            a challenger's evidence reaches ``fix_evidence``: it is adopted
+    LOCALIZED            OFF_MAP              the vehicle leaves the mapped roads, on roads of the network
+    OFF_MAP              LOCALIZED            it comes back to a mapped road
+    LOCALIZED, OFF_MAP   DOUBTED              views vouch for another place, or are not like the believed one; or no road is there
+    DOUBTED              LOCALIZED, OFF_MAP   the doubt ends (below)
+    all but UNKNOWN      LOST                 too much was driven since a view agreed
+    LOST                 any of the others    a view agrees with the incumbent, or a challenger is adopted
+
+What ends a doubt: of another place, that a view agrees with the incumbent or that the challenger's evidence fades; of an unlike
+place, that views are like it again; of dead reckoning, that a view agrees with the incumbent. The adoption of the challenger ends
+all three. It takes evidence of ``fix_evidence`` on top of the incumbent's.
 
 A belief that weighs all hypotheses itself has no challenger. Its margins are summed, and once they reach ``fix_evidence`` there
 is a fix for good.
@@ -58,7 +61,7 @@ class Relation(Enum):
 class Fix:
     """What is known about the believed place. Evidence is a sum of margins."""
 
-    adopted: bool = False  # whether there is an incumbent
+    adopted: bool = False  # whether a pose was adopted: from then on there is an incumbent
     total: float = 0.0  # evidence of all views so far; only for beliefs without a challenger
     support: float = 0.0  # evidence of the incumbent, as far as remembered
     challenge: float = 0.0  # evidence of the challenger, as far as remembered

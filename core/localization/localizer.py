@@ -96,8 +96,7 @@ class Localizer:
         """Take one observation in; returns the estimate at its time."""
         observation = observation if self._odometry is None else self._odometry.step(observation)
         self._predict(observation)
-        due = self._match is None or keyframes.is_due(self._view_change, self._config.steps)
-        if observation.frame is not None and due:
+        if observation.frame is not None and (self._match is None or keyframes.is_due(self._view_change, self._config.steps)):
             self._query(observation.frame)
         return self._estimate(observation.t_s)
 

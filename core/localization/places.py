@@ -46,8 +46,8 @@ class PlaceMap:
     after: IntArray  # (C,) cell of the visit after, -1: none near
     predecessors: Predecessors  # links by the cell that they lead to: lengths in m, one step of driving at most
     at_end: NDArray[np.bool_]  # (C,) no cell leads here, or none leads on from here: where a mapped road ends
-    successor_start: IntArray  # (C + 1,) the same links by the cell that they come from:
-    successor: IntArray  # (K,) cell ``i`` leads to ``successor[successor_start[i]:successor_start[i + 1]]``
+    successor_start: IntArray  # (C + 1,) the same links by the cell that they come from, in CSR form:
+    successor: IntArray  # (K,) cell ``i`` leads to the rows ``successor_start[i]`` to ``successor_start[i + 1]`` of this
 
 
 def make_place_map(cognitive_map: CognitiveMap, network: RoadNetwork | None, lane_sigma_m: float, map_sigma_m: float) -> PlaceMap:

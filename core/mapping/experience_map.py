@@ -130,7 +130,7 @@ def concatenated(a: Edges, b: Edges) -> Edges:
 def relaxed_poses(motions: FloatArray, edges: Edges, config: ExperienceMapConfig) -> FloatArray:
     """Poses (V, 3) of the vertices that fit the edges, the first at the origin; the search begins at dead reckoning.
 
-    ``motions`` (V, 3) lead from each keyframe to the next.
+    ``motions`` (V, 3) lead to each keyframe from the one before; row 0 is ignored.
     """
     reckoned = se2.integrate(np.zeros(3), np.concatenate([np.zeros((1, 3)), motions[1:]])[: len(motions)])
     if config.relaxation == "robust":

@@ -78,7 +78,7 @@ def inject(state: NeuralPose, pose: FloatArray, config: MapperAttractorConfig) -
     strength = np.full(2, config.injection_share * config.grid.information * per_length**2)
     grid = grid_cells.inject(state.grid, pose[:2], strength, config.grid)
     injected = NeuralPose(head, grid, state.position)
-    return NeuralPose(head, grid, np.tile(injected.pose[:2], (2, 1)))
+    return NeuralPose(head, grid, np.tile(injected.pose[:2], (2, 1)))  # both populations are unwrapped from the new read-out on
 
 
 def recorded(states: list[NeuralPose]) -> AttractorStates:

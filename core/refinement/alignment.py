@@ -193,10 +193,10 @@ def _rotation(hypotheses: FloatArray) -> FloatArray:
 def _answer(hypotheses: FloatArray, costs: FloatArray) -> Alignment:
     """The cheapest hypothesis as a similarity, its cost, and that of the cheapest one that counts as another."""
     order = np.argsort(costs, kind="stable")
-    best, scale = order[0], np.hypot(hypotheses[:, 0], hypotheses[:, 1])
-    turn = np.abs(se2.wrap(_rotation(hypotheses) - _rotation(hypotheses)[best]))
+    best, scale, rotation = order[0], np.hypot(hypotheses[:, 0], hypotheses[:, 1]), _rotation(hypotheses)
+    turn = np.abs(se2.wrap(rotation - rotation[best]))
     other = (np.abs(np.log(scale / scale[best])) > _OTHER_SCALE) | (turn > _OTHER_TURN_RAD)
-    similarity = Similarity(float(scale[best]), float(_rotation(hypotheses)[best]), hypotheses[best, 2:])
+    similarity = Similarity(float(scale[best]), float(rotation[best]), hypotheses[best, 2:])
     return Alignment(similarity, float(costs[best]), float(np.min(costs[other], initial=1.0)))
 
 

@@ -112,11 +112,12 @@ def odometry_factors(state: State, visits: Visits, noise: Noise, scale_step_vari
     source[:, 3, 3], target[:, 3, 3] = -1.0, 1.0
     gyro = np.zeros((len(a), 4, 2))
     gyro[:, 2, 0], gyro[:, 2, 1] = -motion[:, 2], -dt
-    root = 1.0 / noise.step_sigmas(np.hypot(metres[:, 0], metres[:, 1]))
+    per_sigma = 1.0 / noise.step_sigmas(np.hypot(metres[:, 0], metres[:, 1]))
     weight = np.ones_like(residual)
-    weight[:, 3] = student_weight((residual[:, 3] ** 2 + scale_step_variance) * root[:, 3] ** 2, noise.scale_inverse_freedom)
-    root = root * np.sqrt(weight)
-    return BinaryFactors(residual * root, source * root[..., None], target * root[..., None], gyro * root[..., None], weight)
+    expected_sq = (residual[:, 3] ** 2 + scale_step_variance) * per_sigma[:, 3] ** 2
+    weight[:, 3] = student_weight(expected_sq, noise.scale_inverse_freedom)
+    gain = per_sigma * np.sqrt(weight)
+    return BinaryFactors(residual * gain, source * gain[..., None], target * gain[..., None], gyro * gain[..., None], weight)
 
 
 def road_factors(state: State, targets: RoadTargets, noise: Noise) -> UnaryFactors:
@@ -141,8 +142,8 @@ def road_factors(state: State, targets: RoadTargets, noise: Noise) -> UnaryFacto
     weight = student_weight(residual**2, noise.road_inverse_freedom)
     weight[:, 2] = 1.0
     weight *= targets.weight[:, None]
-    root = np.sqrt(weight)
-    return UnaryFactors(residual * root, jacobian * root[..., None], weight)
+    gain = np.sqrt(weight)
+    return UnaryFactors(residual * gain, jacobian * gain[..., None], weight)
 
 
 def closure_factors(state: State, closures: Edges, noise: Noise) -> BinaryFactors:
@@ -159,13 +160,11 @@ def closure_factors(state: State, closures: Edges, noise: Noise) -> BinaryFactor
     source, target = _relative_pose_jacobians(a, seen)
     source, target = source[:, :3], target[:, :3]
     source[:, :2, 3] = -metres
-    root = 1.0 / (noise.closure_factor * np.column_stack([scale * closures.sigma[:, :2], closures.sigma[:, 2]]))
-    sq = np.sum((residual * root) ** 2, axis=1)
-    weight = geman_mcclure_weight(sq, GEMAN_MCCLURE**2)
-    root = root * np.sqrt(weight)[:, None]
-    no_gyro = np.zeros((len(a), 3, 2))
-    weights = np.repeat(weight[:, None], 3, 1)
-    return BinaryFactors(residual * root, source * root[..., None], target * root[..., None], no_gyro, weights)
+    per_sigma = 1.0 / (noise.closure_factor * np.column_stack([scale * closures.sigma[:, :2], closures.sigma[:, 2]]))
+    weight = geman_mcclure_weight(np.sum((residual * per_sigma) ** 2, axis=1), GEMAN_MCCLURE**2)
+    gain = per_sigma * np.sqrt(weight)[:, None]
+    no_gyro, weights = np.zeros((len(a), 3, 2)), np.repeat(weight[:, None], 3, 1)
+    return BinaryFactors(residual * gain, source * gain[..., None], target * gain[..., None], no_gyro, weights)
 
 
 def normal_equations(state: State, factors: Factors, closures: Edges) -> ChainSystem:

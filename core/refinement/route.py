@@ -87,7 +87,7 @@ def first_keyframes(cognitive_map: CognitiveMap) -> IntArray:
     """Index (V,) of the keyframe that made each vertex. Our mapper makes one vertex per keyframe; a stored map may share them."""
     order = np.arange(len(cognitive_map.visits.vertex), dtype=np.int32)
     first = np.zeros(len(cognitive_map.poses), dtype=np.int32)
-    first[cognitive_map.visits.vertex[::-1]] = order[::-1]
+    first[cognitive_map.visits.vertex[::-1]] = order[::-1]  # written backwards: of several keyframes the first one remains
     return first
 
 

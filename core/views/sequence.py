@@ -24,13 +24,13 @@ class SequenceConfig:
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
-    memory: float = 0.6  # lambda, the weight of the evidence so far: about three views; a longer memory misses turns at junctions
-    length_tolerance: float = 0.6  # of a path's length against the distance driven: accepts 2 to 8 m at a spacing of 5 m
-    turn_tolerance_rad: float = 0.5  # of the turn along a path against the turn driven: tells the legs of a junction apart
-    neighbourhood: float = 3.0  # cells closer than this to the best one show the same place and do not count as its rivals
-    min_cells: int = 30  # with fewer cells scores are not standardised: the standard deviation of a handful is next to nothing
-    sigma_floor: float = 0.03  # smallest standard deviation of cosine similarities: that of pure noise in 1,024 dimensions
-    grey_sigma_floor: float = 1.0  # smallest standard deviation of similarities of kind "grey", in grey levels
+    memory: float = 0.6  # lambda, the weight of earlier evidence: about three views; longer chains run straight on at junctions
+    length_tolerance: float = 0.6  # largest difference of a path's length to the way driven: 2 to 8 m fit at a spacing of 5 m
+    turn_tolerance_rad: float = 0.5  # largest difference of a path's turn to the turn driven: tells the legs of a junction apart
+    neighbourhood: float = 3.0  # cells closer than this to the best one show the same place and are no rivals
+    min_cells: int = 30  # fewer cells make no statistics, and give no evidence: the spread of a handful is next to nothing
+    sigma_floor: float = 0.03  # smallest spread of cosine similarities to divide by: that of pure noise in 1,024 dimensions
+    grey_sigma_floor: float = 1.0  # smallest spread of similarities of kind "grey" to divide by, in grey levels
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.memory < 1.0:

@@ -10,7 +10,7 @@ from typing import get_args
 
 import pytest
 
-from hippodrome.core.localization.config import Mode
+from hippodrome.core.localization.beliefs.config import Mode
 from hippodrome.eval.cli import main, make_parser
 from hippodrome.eval.commands import exchange, trials
 from hippodrome.eval.commands.arguments import BAD_INPUT

@@ -51,7 +51,7 @@ class PoseBelief(Protocol):
         """The belief after a motion of the vehicle."""
 
     def inject(self, measurement: PoseMeasurement) -> Self:
-        """The belief after a measured pose, of the incumbent where there are hypotheses; a challenger is dismissed."""
+        """The belief after a measured pose. With a challenger it is the incumbent's, and the challenger is dismissed."""
 
     def activity(self) -> NetworkActivity:
         """State of the attractor networks."""

@@ -17,10 +17,10 @@ class MotionNoise:
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
-    speed: float = 0.03  # standard deviation of the speed relative to it, as white noise, per square root of a second
-    gyro_rad_per_sqrt_s: float = 0.002  # random walk of the heading, at least: 0.1 deg per sqrt(s); more if the signal is noisier
+    speed: float = 0.03  # standard deviation of the speed, relative to it: white noise, per square root of a second
+    gyro_rad_per_sqrt_s: float = 0.002  # random walk of the heading, 0.1 deg per sqrt(s); more where the signal shows more
     gyro_gain: float = 0.01  # error of each turn, as a share of the turned angle
-    scale_prior: float = 0.3  # standard deviation of ln(metres per unit) of this drive about the map's: each drive's is 0.2
+    scale_prior: float = 0.3  # standard deviation of ln(metres per unit) between the mapping drive and this one, 0.2 each
     scale_walk_per_sqrt_m: float = 0.004  # random walk of ln(metres per unit): 4 % in 100 m
 
 
@@ -34,12 +34,12 @@ class InjectionNoise:
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
-    along_m: float = 1.2  # standard deviation along the road: 0.7 m between views 5 m apart, more as errors in a row are alike
-    across_m: float = 0.4  # standard deviation across it: two drivers' wander in the lane, 0.2 to 0.5 m over tens of metres
+    along_m: float = 1.2  # standard deviation along the road: 0.7 m between views 5 m apart, and more as errors repeat
+    across_m: float = 0.4  # standard deviation across the road: two drivers' wander in a lane, 0.2 to 0.5 m over tens of metres
     heading_rad: float = 0.05  # standard deviation of the heading
-    map_m: float = 0.4  # error of the map along the road beyond its own covariance, which takes self-motion errors for white
+    map_m: float = 0.4  # error of the map along the road beyond its covariance, for which errors of self-motion are white noise
     wander_m: float = 0.3  # wander of this driver in the lane, 0.2 to 0.5 m: no view shows it, so it is added to the covariance
-    gate: float = 12.0  # squared Mahalanobis distance beyond which a view conflicts with the belief: 99.3 % for three numbers
+    gate: float = 12.0  # squared Mahalanobis distance up to which a view agrees with the belief: 99.3 % of right ones (3 dof)
 
 
 @dataclass(frozen=True)
@@ -69,5 +69,5 @@ class BeliefConfig:
     injection: InjectionNoise = field(default_factory=InjectionNoise)
     head: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=4e4))  # sigma 0.005 rad at best
     grid: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=1e4))  # sigma 0.15 m at best
-    smallest_period_m: float = 97.0  # smallest of the grid modules' periods; half of it must exceed the drift between two fixes
+    smallest_period_m: float = 97.0  # smallest period of the grid modules; half of it must exceed the drift between two fixes
     paper: PaperNetworks = field(default_factory=PaperNetworks)

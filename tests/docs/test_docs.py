@@ -128,7 +128,7 @@ def rows_with_functions():
                 yield pytest.param(files, code_in(row["functions"]), id=row["what"])
 
 
-@pytest.mark.parametrize(("files", "names"), rows_with_functions())
+@pytest.mark.parametrize(("files", "names"), list(rows_with_functions()))
 def test_the_functions_of_an_equation_are_in_the_file_named_and_are_used(files, names):
     assert files
     defined = set().union(*(defined_in(path) for path in files))

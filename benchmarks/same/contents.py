@@ -6,6 +6,7 @@ import gzip
 import hashlib
 import io
 import json
+import re
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
@@ -24,6 +25,7 @@ Reader: TypeAlias = Callable[[Path], Iterator[tuple[str, Leaf]]]
 
 PROVENANCE: Final = frozenset({"configuration", "provenance", "versions", "code_sha256", "sha256"})
 FILE_SIZES: Final = frozenset({"map_bytes", "bytes_per_view"})  # a map's file also holds its provenance: its arrays are compared
+RECORDING_KEY: Final = re.compile(r"-[0-9a-f]{16}$")  # ends a recording's name and depends on the code that made it
 LEFT_OUT: Final = TIMING_FIELDS | PROVENANCE | FILE_SIZES | {"cpu_s", "rerun"}  # rerun: the command to type
 
 
@@ -59,7 +61,7 @@ def network_of(path: Path) -> Iterator[tuple[str, Leaf]]:
 
 
 def figures_of(path: Path) -> Iterator[tuple[str, Leaf]]:
-    """A JSON file: every figure and text, modes by their present names, without what ``LEFT_OUT`` names."""
+    """A JSON file: every figure and text, modes by their present names, recordings without their key, without what ``LEFT_OUT`` names."""
     yield from _json_leaves(json.loads(path.read_text(encoding="utf-8")), "")
 
 
@@ -74,7 +76,7 @@ def _json_leaves(value: Any, place: str) -> Iterator[tuple[str, Leaf]]:
         for index, item in enumerate(value):
             yield from _json_leaves(item, f"{place}[{index}]")
     else:
-        yield place, value
+        yield place, RECORDING_KEY.sub("", value) if isinstance(value, str) else value
 
 
 def _fields_of(value: Any, place: str) -> Iterator[tuple[str, Leaf]]:

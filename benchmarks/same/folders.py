@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.same.contents import (
+    RECORDING_KEY,
     Leaf,
     Reader,
     arrays_of,
@@ -46,7 +47,7 @@ KINDS: Final[tuple[tuple[str, str, Reader], ...]] = (  # the first pattern that 
     ("evidence (map.json)", r"map\.json", figures_of),
 )
 SKIPPED_FOLDERS: Final = frozenset({"rows", "cells", "orb-slam3"})  # kept rows and cells are in the tables; the last is random
-RECORDING_KEY, TOWN_KEY = re.compile(r"-[0-9a-f]{16}$"), re.compile(r"-[0-9a-f]{12}(?=\.net\.xml)")
+TOWN_KEY: Final = re.compile(r"-[0-9a-f]{12}(?=\.net\.xml)")
 SPECIFICATION: Final = ("seed", "town", "drive", "camera", "odometry_rate_hz", "noise")  # keys of a recording's manifest
 MAX_NAMED: Final = 5  # differing values of one file that are named
 

@@ -32,6 +32,7 @@ def original(tmp_path_factory):
     root = tmp_path_factory.mktemp("before")
     make_run(root)
     (root / "results.json").write_text(json.dumps(RESULTS))
+    (root / "hamlet" / "map.json").write_text(json.dumps({"recordings": {"mapping": "hamlet-mapping-0123456789abcdef"}}))
     (root / "hamlet" / "robustness.json").write_text(json.dumps({"conditions": [{"mode": "default", "nees": 0.5}]}))
     np.savez(root / "hamlet" / "ratslam.npz", codes=np.zeros((3, 2), np.float32))
     return root
@@ -43,6 +44,7 @@ def copy(original, tmp_path):
     shutil.copytree(original, tmp_path / "after")
     for role in ("mapping", "localization"):
         recordings = tmp_path / "after" / "recordings"
+        (tmp_path / "after/hamlet/map.json").write_text('{"recordings": {"mapping": "hamlet-mapping-fedcba9876543210"}}')
         (recordings / f"hamlet-{role}-0123").rename(recordings / f"hamlet-{role}-0123-fedcba9876543210")
     return tmp_path / "after"
 

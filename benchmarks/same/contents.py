@@ -61,7 +61,7 @@ def network_of(path: Path) -> Iterator[tuple[str, Leaf]]:
 
 
 def figures_of(path: Path) -> Iterator[tuple[str, Leaf]]:
-    """A JSON file: every figure and text, modes by their present names, recordings without their key, without what ``LEFT_OUT`` names."""
+    """A JSON file: its figures and texts but for ``LEFT_OUT``, modes by present names, recordings without their key."""
     yield from _json_leaves(json.loads(path.read_text(encoding="utf-8")), "")
 
 

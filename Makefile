@@ -6,7 +6,7 @@ WORKERS ?= 2
 GATED := scenarios/gate/*.yaml --baseline scenarios/baseline.json
 
 .DEFAULT_GOAL := help
-.PHONY: help setup eval gate previews paper baselines test lint bench docs cover clean
+.PHONY: help setup eval gate previews paper baselines test lint bench docs site cover clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-9s %s\n", $$1, $$2}'
@@ -52,6 +52,10 @@ bench: setup  ## speed and memory, as ratios measured in one run
 
 docs: setup  ## make the tables of docs/scenarios.md anew from the models
 	@$(BIN)/python -m hippodrome.eval.authoring.reference docs/scenarios.md
+
+site: setup  ## these documents and the docstrings as pages, in out/site; broken links fail
+	@$(BIN)/python docs/site/make.py out/site-sources
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --clean && echo "written: out/site/index.html"
 
 cover: eval  ## make the README's picture and table anew from the default run
 	@$(BIN)/python -m hippodrome.eval.report.cover out/eval grid

@@ -5,16 +5,25 @@ A benchmark is a module of this package with ``run() -> list[Row]``; add its nam
 
 from __future__ import annotations
 
+import argparse
 import sys
 from importlib import import_module
 
 from benchmarks.table import Row, table
 from hippodrome.eval.pool import one_opencv_thread
 
-NAMES = ("render", "mapping", "localization", "matching", "scaling")
+NAMES = {
+    "render": "drawing frames",
+    "mapping": "building maps",
+    "localization": "localizing in a map",
+    "matching": "matching a drive to lanes, beside two well-known map matchers",
+    "scaling": "refinement time and memory against the length of the drive",
+}
 
 
-def main(names: list[str]) -> int:
+def main(arguments: list[str]) -> int:
+    """Run the benchmarks that are named and print their table; the exit status."""
+    names = _parser().parse_args(arguments).names
     unknown = sorted(set(names) - set(NAMES))
     if unknown:
         print(f"no benchmark named {', '.join(unknown)}; there are: {', '.join(NAMES)}", file=sys.stderr)
@@ -26,6 +35,17 @@ def main(names: list[str]) -> int:
         rows += import_module(f"benchmarks.{name}").run()
     print(table(rows))
     return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks",
+        description="Measure speed and memory and print one table, a figure a line. Run it from the repository's folder.",
+        epilog="example: python -m benchmarks render mapping",
+    )
+    listed = "; ".join(f"{name}: {words}" for name, words in NAMES.items())
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"benchmarks to run (default: all of them). {listed}")
+    return parser
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Localization: a step with a frame to look at, a step without, and one tick of the attractor networks.
+"""Localization: a step with a query frame, a step without, and one tick of the attractor networks.
 
 Views lie 5 m apart along a street that winds to and fro; each blends two described pictures of boxes, so that they differ in
 about as few directions as a town's. Recall is that of the sketched search: how often it scores the cell that the exhaustive one
@@ -17,21 +17,16 @@ from hippodrome.core.attractors import grid_cells, head_direction
 from hippodrome.core.attractors.attractor import AttractorConfig
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
 from hippodrome.core.types import AttractorStates, CognitiveMap, Edges, Frame, Observation, ViewCells, Visits
-from hippodrome.core.views.descriptors import (
-    ViewCellConfig,
-    bank_of,
-    describe,
-    start_query_mean,
-    template_mean,
-)
+from hippodrome.core.views.descriptors import ViewCellConfig, describe
 from hippodrome.core.views.index import SearchConfig, index_of, search
+from hippodrome.core.views.scoring import bank_of, start_query_mean, template_mean
 
 BANKS = (1_400, 10_000, 100_000)
 SPACING_M, ROW_M, ROWS_APART_M = 5.0, 2_000.0, 30.0
-LOOKS, TICKS = 40, 2_000
-STEPS = 4  # of odometry at 10 Hz for each look, which a localizer takes every 0.4 s at its usual speed
-PICTURES = 1_000  # described ones that the views are blended from
-NOISE = 12.0  # of a descriptor seen again: about what another sun makes of it
+QUERIES, TICKS = 40, 2_000
+STEPS = 4  # of odometry at 10 Hz for each query frame, which a localizer takes every 0.4 s at its usual speed
+PICTURES = 1_000  # described pictures that the views are blended from
+NOISE = 12.0  # standard deviation of a descriptor seen again: about what another sun makes of it
 NO_CELLS = np.zeros(0, dtype=np.int32)
 
 
@@ -63,21 +58,21 @@ def _attractor_tick() -> Row:
 def _localizer_steps(views: int) -> list[Row]:
     rng = np.random.default_rng(views)
     localizer = Localizer(_winding_map(views, rng), None, LocalizerConfig())
-    frames = rng.integers(0, 256, (LOOKS, 120, 160, 3), dtype=np.uint8)
+    frames = rng.integers(0, 256, (QUERIES, 120, 160, 3), dtype=np.uint8)
     number = iter(range(10**9))
     kind = "exhaustive" if views <= SearchConfig().exhaustive_cells else "sketched"
 
     def observe(frame: Frame | None) -> None:
-        localizer.step(Observation(0.6 * (next(number) + 1), 0.6, 4.0, 0.0, frame))  # one view step: each frame is looked at
+        localizer.step(Observation(0.6 * (next(number) + 1), 0.6, 4.0, 0.0, frame))  # far enough on: each frame is a query
 
     observe(frames[0])
-    looks = [_median_s(lambda frame=frame: observe(frame), 1) for frame in frames]  # type: ignore[misc]
-    look, blind = float(np.median(looks)), _median_s(lambda: observe(None), 200)
-    mean_ms = 1e3 * (look + (STEPS - 1) * blind) / STEPS
+    queries = [_median_s(lambda frame=frame: observe(frame), 1) for frame in frames]  # type: ignore[misc]
+    query, blind = float(np.median(queries)), _median_s(lambda: observe(None), 200)
+    mean_ms = 1e3 * (query + (STEPS - 1) * blind) / STEPS
     return [
-        Row("localization", f"step with a look, {views} views", 1e3 * look, "ms", f"{kind} search"),
+        Row("localization", f"step with a query frame, {views} views", 1e3 * query, "ms", f"{kind} search"),
         Row("localization", f"step without, {views} views", 1e3 * blind, "ms"),
-        Row("localization", f"step, mean, {views} views", mean_ms, "ms", "10 Hz, a look every 0.4 s"),
+        Row("localization", f"step, mean, {views} views", mean_ms, "ms", "10 Hz, a query frame every 0.4 s"),
     ]
 
 
@@ -88,22 +83,22 @@ def _searches(views: int) -> list[Row]:
     index = index_of(bank, config)
     if index is None:
         return []
-    spent_s, found = np.zeros((LOOKS, 2)), 0
-    for look, cell in enumerate(rng.integers(0, views, LOOKS)):
+    spent_s, found = np.zeros((QUERIES, 2)), 0
+    for i, cell in enumerate(rng.integers(0, views, QUERIES)):
         seen = bank.templates[cell] + rng.normal(0.0, NOISE, bank.templates.shape[1])
         query = np.clip(seen, 0, 127).astype(np.int8), start_query_mean(bank.mean)
         began = time.process_time()
         everything = search(bank, None, NO_CELLS, query, cells, config)
         between = time.process_time()
         some = search(bank, index, NO_CELLS, query, cells, config)
-        spent_s[look] = between - began, time.process_time() - between
+        spent_s[i] = between - began, time.process_time() - between
         found += int(np.argmax(everything.similarity)) in some.cells
     exhaustive_ms, sketched_ms = 1e3 * np.median(spent_s, axis=0)
     stored = bank.templates.shape[1]
     return [
         Row("localization", f"exhaustive search, {views} views", exhaustive_ms, "ms", f"{stored} bytes/view"),
         Row("localization", f"sketched search, {views} views", sketched_ms, "ms", f"{stored + index.sketch.shape[1]} bytes/view"),
-        Row("localization", f"sketched recall, {views} views", 100.0 * found / LOOKS, "%", "of its best cell"),
+        Row("localization", f"sketched recall, {views} views", 100.0 * found / QUERIES, "%", "of its best cell"),
     ]
 
 

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import Row
-from hippodrome.core.mapping import experience_map
-from hippodrome.core.mapping.experience_map import Closure
+from hippodrome.core.mapping.experience_map import Closure, closure_edges, concatenated, odometry_edges, relaxed_poses
 from hippodrome.core.mapping.mapper import Mapper, MapperConfig
 from hippodrome.core.types import CognitiveMap, Frame, Observation
-from hippodrome.core.views import descriptors as view_cells
-from hippodrome.core.views import keyframes as view_step
+from hippodrome.core.views import keyframes
+from hippodrome.core.views.descriptors import describe
 from hippodrome.core.views.graph import graph_of
+from hippodrome.core.views.scoring import make_bank, score, start_query_mean, template_mean
 from hippodrome.core.views.sequence import (
     NO_EVIDENCE,
     filter_step,
@@ -29,7 +29,7 @@ from hippodrome.core.views.sequence import (
 
 RATE_HZ, SPEED_MPS, LAP_M, LAPS = 11.2, 5.5, 3_600.0, 2.0  # the paper's camera and drive
 PIXELS_PER_M = 5
-VIEWS = 1_400  # of the paper's map
+VIEWS = 1_400  # stored views of the paper's map
 PAPER_CPU_PERCENT = 1.3
 
 
@@ -47,7 +47,7 @@ def run() -> list[Row]:
 
 
 def _drive(config: MapperConfig) -> tuple[float, CognitiveMap, int]:
-    """Mean CPU per frame [ms], closing of the map included, the map and the number of frames."""
+    """Mean CPU per frame [ms], finishing the map included; the map; the number of frames."""
     panorama, mapper = _panorama(), Mapper(config)
     frames, spent_s = int(LAPS * LAP_M / SPEED_MPS * RATE_HZ), 0.0
     _drive_on(Mapper(config), panorama, range(600))  # compiles what is compiled on first use
@@ -59,6 +59,7 @@ def _drive(config: MapperConfig) -> tuple[float, CognitiveMap, int]:
 
 
 def _drive_on(mapper: Mapper, panorama: Frame, steps: range) -> float:
+    """CPU seconds that the mapper takes for these steps of the drive; making their frames is not counted."""
     observations = [_observation(i, panorama) for i in steps]
     began = time.process_time()
     for observation in observations:
@@ -67,6 +68,7 @@ def _drive_on(mapper: Mapper, panorama: Frame, steps: range) -> float:
 
 
 def _observation(i: int, panorama: Frame) -> Observation:
+    """Step ``i`` of the drive along the panorama, at a scale of half a map unit per metre."""
     left = int(i * SPEED_MPS / RATE_HZ % LAP_M * PIXELS_PER_M)
     frame = np.repeat(panorama[:, left : left + 160, None], 3, axis=2)
     turn_radps = 0.15 * np.sin(i / 150.0)  # bends, so that some views come from turning
@@ -74,20 +76,20 @@ def _observation(i: int, panorama: Frame) -> Observation:
 
 
 def _stages(config: MapperConfig) -> list[Row]:
-    """Medians per call, with ``VIEWS`` stored."""
+    """Median CPU per call of each stage of a keyframe, with ``VIEWS`` views stored."""
     cells, sequence, rng = config.memory.view_cells, config.memory.sequence, np.random.default_rng(0)
     frames = rng.integers(0, 256, (50, 120, 160, 3), dtype=np.uint8)
     templates = rng.integers(0, 60, (VIEWS, int(np.prod(cells.shape))), dtype=np.int8)
-    bank = view_cells.make_bank(cells.kind, cells.shape, templates, view_cells.template_mean(cells.kind, templates))
-    mean = view_cells.start_query_mean(bank.mean, 100)
+    bank = make_bank(cells.kind, cells.shape, templates, template_mean(cells.kind, templates))
+    mean = start_query_mean(bank.mean, 100)
     links = graph_of(np.arange(VIEWS, dtype=np.int32), np.full(VIEWS, 5.0), np.zeros(VIEWS), 3.0).links
     z = standardise(rng.normal(size=VIEWS).astype(np.float32), 30, 0.03)
     evidence = filter_step(NO_EVIDENCE, z, links, 5.0, 0.0, 5.0, sequence)
-    state, observation = view_step.start(), Observation(0.1, 0.1, 4.0, 0.1, None)
+    state, observation = keyframes.start(), Observation(0.1, 0.1, 4.0, 0.1, None)
     calls: dict[str, Callable[[], Any]] = {
-        "view step, each odometry sample": lambda: view_step.advance(state, observation, config.view_step),
-        "describe a 160x120 frame, each view": lambda: view_cells.describe(frames[0], cells),
-        f"score against {VIEWS}, each view": lambda: view_cells.score(bank, templates[7], mean, cells),
+        "view step, each odometry sample": lambda: keyframes.advance(state, observation, config.view_step),
+        "describe a 160x120 frame, each view": lambda: describe(frames[0], cells),
+        f"score against {VIEWS}, each view": lambda: score(bank, templates[7], mean, cells),
         f"sequence filter on {VIEWS}, each view": lambda: filter_step(evidence, z, links, 5.0, 0.0, 5.0, sequence),
         f"best and its margin of {VIEWS}, each view": lambda: peak(evidence, links, 15.0),
     }
@@ -95,13 +97,14 @@ def _stages(config: MapperConfig) -> list[Row]:
 
 
 def _relaxation(config: MapperConfig) -> Row:
+    """Median CPU of relaxing a map of four laps with a closure at every other vertex of the later ones."""
     rng = np.random.default_rng(1)
     motions = np.tile([5.0, 0.0, 2.0 * np.pi / 350.0], (VIEWS, 1)) + rng.normal(size=(VIEWS, 3)) * [0.1, 0.02, 0.01]
     closures = [Closure(i - 350, i, (0.0, 0.0, 0.0), 5.0, 3.0) for i in range(350, VIEWS, 2)]
     settings = config.experience_map
-    odometry = experience_map.odometry_edges(motions, settings)
-    edges = experience_map.joined(odometry, experience_map.closure_edges(closures, settings))
-    taken = _median_s(lambda: experience_map.relaxed_poses(motions, edges, settings), repeats=3)
+    odometry = odometry_edges(motions, settings)
+    edges = concatenated(odometry, closure_edges(closures, settings))
+    taken = _median_s(lambda: relaxed_poses(motions, edges, settings), repeats=3)
     return Row("mapping", f"robust pose graph, {VIEWS} vertices", 1e3 * taken, "ms", f"{len(closures)} closures, once a map")
 
 

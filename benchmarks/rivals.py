@@ -1,6 +1,6 @@
 """Two well-known map matchers on our road network: conversion of the network, and the lane that each gives every point.
 
-Both see lanes, junction-internal ones too, as directed roads of their own; neither knows what a lane is.
+Neither knows what a lane is, so every lane, those inside junctions too, is a directed road of its own to them.
 """
 
 from __future__ import annotations
@@ -13,11 +13,20 @@ import numpy as np
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
 
-SEARCH_SIGMAS = 5.0  # how far from a point either looks for roads, in sigmas of the trace's noise
+SEARCH_SIGMAS = 5.0  # either looks for roads up to so many standard deviations of the trace's noise from a point
 
 
 def leuven(network: RoadNetwork, trace_m: FloatArray, sigma_m: float) -> IntArray:
-    """Lane (N,) of each point by leuvenmapmatching's DistanceMatcher, -1 where it gives none."""
+    """Lanes by leuvenmapmatching's ``DistanceMatcher``.
+
+    Args:
+        network: The road network.
+        trace_m: Points (N, 2) to match.
+        sigma_m: Standard deviation of their noise.
+
+    Returns:
+        Lane (N,) of each point, -1 where the matcher gives none.
+    """
     from leuvenmapmatching.matcher.distance import DistanceMatcher
 
     matcher = DistanceMatcher(
@@ -38,7 +47,11 @@ def leuven(network: RoadNetwork, trace_m: FloatArray, sigma_m: float) -> IntArra
 
 
 def leuven_map(network: RoadNetwork) -> Any:
-    """Nodes are the points of the centrelines; edges join each to the next, and each lane's last to its successors' first."""
+    """The road network as leuvenmapmatching's graph.
+
+    Nodes are the points of the centrelines. Edges lead from each point to the next one of its lane, from the last point of a lane
+    to the first of each successor, and, for lane changes, from each point to the next one of each lane beside.
+    """
     from leuvenmapmatching.map.inmem import InMemMap
 
     graph: dict[int, tuple[tuple[float, float], list[int]]] = {
@@ -49,15 +62,15 @@ def leuven_map(network: RoadNetwork) -> Any:
         onward = graph[last][1]
         onward[:] = [int(network.point_start[other]) for other in network.successors(lane)]
         for beside in (int(network.left_lane[lane]), int(network.right_lane[lane])):
-            if beside >= 0:  # lane changes: to the next point of the lane beside
-                there, count = int(network.point_start[beside]), int(np.diff(network.point_start)[beside])
+            if beside >= 0:
+                start, count = int(network.point_start[beside]), int(np.diff(network.point_start)[beside])
                 for i in range(first, last):
-                    graph[i][1].append(there + min(int((i - first + 1) / (last - first) * (count - 1)) + 1, count - 1))
+                    graph[i][1].append(start + min(int((i - first + 1) / (last - first) * (count - 1)) + 1, count - 1))
     return InMemMap("town", use_latlon=False, use_rtree=True, index_edges=True, graph=graph)
 
 
 def mappymatch(network: RoadNetwork, trace_m: FloatArray, sigma_m: float) -> IntArray:
-    """Lane (N,) of each point by mappymatch's LCSSMatcher, -1 where it gives none."""
+    """Lanes by mappymatch's ``LCSSMatcher``. Arguments and result are those of ``leuven``."""
     from geopandas import GeoDataFrame, points_from_xy
     from mappymatch.constructs.trace import Trace
     from mappymatch.maps.nx.nx_map import NxMap
@@ -71,7 +84,10 @@ def mappymatch(network: RoadNetwork, trace_m: FloatArray, sigma_m: float) -> Int
 
 
 def mappymatch_graph(network: RoadNetwork) -> Any:
-    """Edges are lanes with their centrelines, nodes the places where lanes meet; lane changes have no place in it."""
+    """The road network as mappymatch's graph: an edge per lane with its centreline, a node per place where lanes meet.
+
+    It has no lane changes.
+    """
     import networkx as nx
     from mappymatch.utils.crs import XY_CRS
     from shapely.geometry import LineString
@@ -90,7 +106,7 @@ def mappymatch_graph(network: RoadNetwork) -> Any:
 
 
 def _places(network: RoadNetwork) -> IntArray:
-    """Place (L, 2) at which each lane begins and ends: a lane's end and its successors' beginnings are one."""
+    """Numbers (L, 2) of the places at which each lane begins and ends: a lane ends at the place where its successors begin."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -103,6 +119,6 @@ def _places(network: RoadNetwork) -> IntArray:
 
 
 def quiet() -> None:
-    """Both log much; only what fails is of interest here."""
+    """Let both matchers log errors only."""
     logging.getLogger("be.kuleuven.cs.dtai.mapmatching").setLevel(logging.ERROR)
     logging.getLogger("mappymatch").setLevel(logging.ERROR)

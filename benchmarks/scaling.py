@@ -34,7 +34,12 @@ FULL = (1_000, 3_000, 10_000, 30_000, 100_000)
 PLOT = Path("out/bench/scaling.png")
 SPACING_M = 5.0
 CLOSURES_PER_VERTEX = 0.1  # as in the paper's map: 150 of 1,400 vertices
-STAGES = {"search_route": "route search", "choose_lanes": "lane choice", "_line": "route line", "optimise": "solver"}
+STAGES = {
+    "search_route": "route search",
+    "choose_lanes": "lane choice",
+    "_line_and_places": "route line",
+    "refine_along_route": "solver",
+}
 
 
 def run(sizes: tuple[int, ...] = SIZES) -> list[Row]:

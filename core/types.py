@@ -4,14 +4,18 @@ Frames of reference. *Body*: rear axle of the vehicle, x forward, y left, headin
 *Network*: the road network's metric frame (SUMO coordinates, x east, y north). *Semi-metric*: the mapper's own frame; it begins
 at the first vertex and is measured in map units: one unit is an unknown, slowly varying number of metres (monocular scale).
 A pose is ``(x, y, heading_rad)``. Arrays named ``*_m`` are metres in the network frame; poses without a unit are in map units.
+
+Objects that hold arrays compare by identity: ``a == b`` asks whether both names mean the same object. Compare their arrays with
+``numpy.array_equal``. Their ``repr`` shows the arrays' types and shapes, not their contents.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,15 +32,74 @@ class HippodromeError(Exception):
     """Base of the errors a user can cause and cure. The message names the value, the limit and the place."""
 
 
-@dataclass(frozen=True, slots=True)
-class Observation:
-    """What the vehicle senses over ``(t_s - dt_s, t_s]``: all that the mapper and the localizer ever receive."""
+class ObservationError(HippodromeError, ValueError):
+    """A sensor reading that cannot be one. The message names the field, its value and what is expected."""
+
+
+class ShortRepr:
+    """A ``repr`` of one line: arrays by type and shape, long tuples by their length."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        shown = (f"{field.name}={_short(getattr(self, field.name))}" for field in fields(self))  # type: ignore[arg-type]
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype}{list(value.shape)}"
+    if isinstance(value, tuple) and len(value) > 4:
+        return f"<{len(value)} items>"
+    return repr(value)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Observation(ShortRepr):
+    """What the vehicle senses over ``(t_s - dt_s, t_s]``: all that the mapper and the localizer ever receive.
+
+    Args:
+        t_s: time at the end of the interval, seconds, on any clock that does not jump.
+        dt_s: length of the interval, seconds, positive.
+        speed: mean forward speed over the interval, map units per second. Metres per map unit may be unknown and may drift.
+        yaw_rate_radps: mean yaw rate over the interval, counter-clockwise positive.
+        frame: camera frame taken at ``t_s``: (H, W, 3) RGB or (H, W) grey, 8 bits; None where the camera took none.
+
+    Raises:
+        ObservationError: a number is not finite, ``dt_s`` is not positive, or ``frame`` is not such an image.
+    """
 
     t_s: float
     dt_s: float
-    speed: float  # mean forward speed, map units per second; metres per unit are unknown and drift
-    yaw_rate_radps: float  # mean, counter-clockwise positive
-    frame: Frame | None  # taken at t_s; None when the camera is slower than the odometry
+    speed: float
+    yaw_rate_radps: float
+    frame: Frame | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.t_s) and math.isfinite(self.speed) and math.isfinite(self.yaw_rate_radps)):
+            name = next(name for name in ("t_s", "speed", "yaw_rate_radps") if not math.isfinite(getattr(self, name)))
+            raise ObservationError(
+                f"observation at t_s={self.t_s}: {name} is {getattr(self, name)}, a finite number is expected; "
+                "leave such a reading out and give the next one the longer dt_s"
+            )
+        if not 0.0 < self.dt_s < math.inf:
+            raise ObservationError(
+                f"observation at t_s={self.t_s}: dt_s is {self.dt_s}, a positive number of seconds is expected: "
+                "the time since the observation before"
+            )
+        if self.frame is not None:
+            _check_frame(self.frame, self.t_s)
+
+
+def _check_frame(frame: Frame, t_s: float) -> None:
+    """An image is 8 bits deep, grey (H, W) or RGB (H, W, 3), and not empty. Raises ObservationError."""
+    shape = getattr(frame, "shape", None)
+    if isinstance(frame, np.ndarray) and frame.dtype == np.uint8 and frame.size and (frame.ndim == 2 or frame.shape[2:] == (3,)):
+        return
+    found = f"{frame.dtype} of shape {shape}" if isinstance(frame, np.ndarray) else type(frame).__name__
+    raise ObservationError(
+        f"observation at t_s={t_s}: frame is {found}; an array of uint8 of shape (H, W, 3), RGB, or (H, W), grey, is expected"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +119,8 @@ Step: TypeAlias = tuple[Observation, GroundTruth]
 Episode: TypeAlias = Iterable[Step]
 
 
-@dataclass(frozen=True, slots=True)
-class Trajectory:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Trajectory(ShortRepr):
     """Time-stamped poses. ``t_s`` (N,) strictly increasing; ``poses`` (N, 3)."""
 
     t_s: FloatArray
@@ -90,8 +153,8 @@ class LocalizationStatus(IntEnum):
     LOST = 4  # the fix is too old to say where
 
 
-@dataclass(frozen=True, slots=True)
-class ViewCells:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ViewCells(ShortRepr):
     """Local view cells: C stored views of dimension D."""
 
     kind: Literal["gradient", "grey"]
@@ -100,8 +163,8 @@ class ViewCells:
     shape: tuple[int, ...]  # the descriptor before flattening, e.g. (rows, columns, bins)
 
 
-@dataclass(frozen=True, slots=True)
-class Edges:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Edges(ShortRepr):
     """E edges of the experience map; ``motion`` is (p_ab, psi_ab) of Eq. (11), target seen from source, map units and rad."""
 
     source: IntArray  # (E,)
@@ -112,8 +175,8 @@ class Edges:
     margin: Float32Array  # (E,) evidence of a closure (filtered margin); 0 for odometry
 
 
-@dataclass(frozen=True, slots=True)
-class Visits:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Visits(ShortRepr):
     """The time-ordered visit sequence with *raw* relative motions, undistorted by closures or the attractor read-out."""
 
     t_s: FloatArray  # (S,)
@@ -121,8 +184,8 @@ class Visits:
     motion: FloatArray  # (S, 3) body motion since the previous visit, map units and rad; row 0 is zero
 
 
-@dataclass(frozen=True, slots=True)
-class AttractorStates:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class AttractorStates(ShortRepr):
     """Head-direction and grid-cell networks at each vertex (Eqs. 1, 2). M grid modules.
 
     Populations: 0 integrator, 1 calibration.
@@ -135,8 +198,8 @@ class AttractorStates:
     grid_reliability: Float32Array  # (V, M, 2 populations, 2 axes) 1/rad^2
 
 
-@dataclass(frozen=True, slots=True)
-class RoadMatch:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class RoadMatch(ShortRepr):
     """Where each vertex lies on the road network, or why it does not."""
 
     lane_ids: tuple[str, ...]  # names that ``lane`` indexes
@@ -145,7 +208,7 @@ class RoadMatch:
     status: UInt8Array  # (V,) MatchStatus
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CognitiveMap:
     """The cognitive map, semi-metric as built or topometric ("network") as refined. V vertices, one per visit of a place."""
 
@@ -161,6 +224,10 @@ class CognitiveMap:
     covariance: FloatArray | None = None  # (V, 3, 3) m, m, rad; network frame only
     road_match: RoadMatch | None = None  # network frame only
 
+    def __repr__(self) -> str:
+        vertices, edges, cells = len(self.poses), len(self.edges.source), len(self.view_cells.templates)
+        return f"CognitiveMap(frame={self.frame!r}, {vertices} vertices, {edges} edges, {cells} view cells)"
+
 
 @dataclass(frozen=True, slots=True)
 class StartPose:
@@ -173,8 +240,8 @@ class StartPose:
     sigma_rad: float = 0.2
 
 
-@dataclass(frozen=True, slots=True)
-class LocalizationEstimate:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LocalizationEstimate(ShortRepr):
     """The localizer's answer after one observation, in the network frame."""
 
     t_s: float
@@ -200,7 +267,7 @@ class MatchBreak:
     cause: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Refinement:
     """A semi-metric map turned topometric, with everything a user needs in order to trust it."""
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.commands.arguments import BAD_INPUT, INTERRUPTED
+from hippodrome.eval.commands.arguments import BAD_INPUT, INTERRUPTED, Command, HelpLayout, print_help
 from hippodrome.eval.commands.authoring import add_scenario_command
 from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands
@@ -15,7 +16,13 @@ from hippodrome.eval.commands.runs import add_run_commands
 from hippodrome.eval.commands.stages import add_stage_commands
 from hippodrome.eval.commands.sweep import add_sweep_command
 from hippodrome.eval.commands.trials import add_trial_commands
-from hippodrome.eval.pool import one_opencv_thread
+
+DESCRIPTION = """\
+Build, refine, localize in and score topometric cognitive maps of simulated drives, or of drives that others recorded.
+
+A car drives through a town. A mapper that sees only its camera and its odometry builds a semi-metric map; a road network makes
+the map topometric; a second drive is localized in it. `hippodrome eval` does all that for a scenario, a YAML file that
+`hippodrome scenario new` writes. `hippodrome COMMAND --help` says what a command takes and writes."""
 
 EPILOG = """\
 examples:
@@ -32,9 +39,11 @@ exit status: 0 done, 1 a threshold or a cell failed, 2 bad input (nothing is ove
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of the command ``hippodrome``."""
-    options = _parser().parse_args(arguments)
-    command: Callable[[argparse.Namespace], int] = options.command
+    """Entry point of the command ``hippodrome``; the exit status."""
+    options = make_parser().parse_args(arguments)
+    command: Command = options.command
+    from hippodrome.eval.pool import one_opencv_thread  # not before the arguments are read: --help answers at once
+
     one_opencv_thread()
     try:
         return command(options)
@@ -46,14 +55,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="hippodrome",
-        description="Builds, refines, localizes in and scores topometric cognitive maps of simulated drives.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of all commands. ``command`` of the parsed options is the function that runs what was asked for."""
+    parser = argparse.ArgumentParser(prog="hippodrome", description=DESCRIPTION, epilog=EPILOG, formatter_class=HelpLayout)
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    parser.set_defaults(command=print_help(parser))
+    commands = parser.add_subparsers(metavar="COMMAND", title="commands")
     add_run_commands(commands)
     add_scenario_command(commands)
     add_gate_commands(commands)
@@ -62,6 +69,16 @@ def _parser() -> argparse.ArgumentParser:
     add_sweep_command(commands)
     add_exchange_commands(commands)
     return parser
+
+
+class _Version(argparse.Action):
+    """Prints the version of the installed package, which is looked up only then."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version
+
+        print(f"hippodrome {version('hippodrome')}")
+        parser.exit()
 
 
 if __name__ == "__main__":

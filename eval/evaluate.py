@@ -1,61 +1,42 @@
-"""One scenario from its two recordings to its rows, maps, trajectories and figures."""
+"""One scenario from its two recordings to its rows, maps, trajectories and figures: the story of an evaluation.
+
+The first drive is mapped. The map is refined with the road network, once in each mode of the refinement. The second drive is
+localized in each refined map. Everything is scored against ground truth, which the algorithms never see, and stands beside dead
+reckoning and the rivals that are given the same frames. ``Mapper``, ``refine`` and ``Localizer`` of ``core`` are called here.
+"""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
 
-import numpy as np
-
+from hippodrome.core.localization.localizer import Localizer
+from hippodrome.core.mapping.mapper import Mapper
+from hippodrome.core.refinement.refine import refine
 from hippodrome.core.se2 import interpolate
-from hippodrome.core.types import CognitiveMap, HippodromeError, StartPose, Trajectory
+from hippodrome.core.types import CognitiveMap, HippodromeError, Trajectory
 from hippodrome.eval.figures.scenario import draw_scenario
-from hippodrome.eval.files.scenarios import portable
-from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.eval.methods.materials import (
     Materials,
-    Scored,
-    Topometric,
-    file_stem,
+    ScoredTrajectory,
+    TopometricResult,
     gather,
     refine_config,
     score_trajectory,
+    true_start,
 )
-from hippodrome.eval.methods.stages import (
-    dead_reckoning,
-    localize_recording,
-    map_recording,
-    refine_map,
-)
+from hippodrome.eval.methods.method import DEAD_RECKONING, NO_ATTRACTOR, REFINED, SEMI_METRIC, Method
+from hippodrome.eval.methods.stages import dead_reckoning, localize_recording, map_recording, timed
 from hippodrome.eval.methods.warm_up import warm_up
 from hippodrome.eval.metrics.localization import score_localization
-from hippodrome.eval.metrics.map_quality import (
-    closures,
-    matched_lane_accuracy,
-    matched_lane_ids,
-    score_closures,
-)
-from hippodrome.eval.metrics.trajectory import ape
 from hippodrome.eval.report.evidence import write_map_evidence
-from hippodrome.eval.results.model import (
-    Network,
-    Row,
-    ScenarioResult,
-    summarize,
-    summarize_localization,
-)
-from hippodrome.eval.rivals.rows import NO_ATTRACTOR, Rival, rivals
-from hippodrome.proto.atomic import write_atomically
+from hippodrome.eval.results.evidence import write_trajectories
+from hippodrome.eval.results.model import Row, ScenarioResult
+from hippodrome.eval.results.rows import map_size, own_frame_row, semi_metric_figures, topometric_row
+from hippodrome.eval.results.scenario import scenario_result
+from hippodrome.eval.rivals.rows import run_rivals
 from hippodrome.proto.codec import save_map
-from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import Scenario
-
-DEAD_RECKONING, SEMI_METRIC = "dead reckoning", "semi-metric"
-MAP_FILES = {"paper": "topometric-paper.pbstream", "route": "topometric-default.pbstream"}  # read by name since 0.1
-MODES: tuple[tuple[str, Literal["paper", "route"]], ...] = (("topometric (paper)", "paper"), ("topometric", "route"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,191 +45,83 @@ class EvaluationTask:
 
     scenario: Scenario
     out: Path
-    figures: bool = True  # a sweep of thousands leaves them: they take most of a short scenario's time
+    figures: bool = True  # drawing takes most of a short scenario's time, so sweeps of many do without
 
 
 def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
-    """Map, refine in both modes, localize, score, draw; everything is written below ``out/<scenario name>``."""
+    """Map, refine in both modes, localize, score, write and draw. All files go to ``out/<scenario name>``.
+
+    A method that fails has a row that says why; the other methods go on.
+
+    Raises:
+        HippodromeError: No semi-metric map can be made of the mapping drive, or it cannot be scored.
+    """
     warm_up()
     materials = gather(task.scenario, task.out)
+    semi_metric, mapping_s = map_recording(materials.mapping.observations(), Mapper(task.scenario.mapper))
+    rows, scored = _own_frame_methods(materials, semi_metric, mapping_s)
+    topometric: dict[Method, TopometricResult] = {}
+    for method in REFINED:
+        try:
+            result = _refine_and_localize(method, semi_metric, materials)
+        except HippodromeError as error:
+            rows.append(Row(method=method.label, failure=str(error), **map_size(semi_metric)))
+        else:
+            cpu_percent = 100 * (mapping_s + result.cpu_s) / materials.duration_s
+            rows.append(topometric_row(method, result, materials.mapping, cpu_percent))
+            topometric[method], scored[method] = result, result.scored
+    write_trajectories(materials, scored, topometric)
+    write_map_evidence(materials, scored, topometric)
+    if task.figures:
+        draw_scenario(materials, semi_metric, scored, topometric)
+    return scenario_result(materials, rows, mapping_s, topometric)
+
+
+def _own_frame_methods(
+    materials: Materials, semi_metric: CognitiveMap, mapping_s: float
+) -> tuple[list[Row], dict[Method, ScoredTrajectory]]:
+    """Dead reckoning, the semi-metric map, and the rivals: their rows, and the trajectories that figures show.
+
+    All of them have a frame and a scale of their own, and are sampled at the times of the map's vertices.
+    """
     truth, duration_s = materials.mapping.ground_truth(), materials.duration_s
     reckoned, reckoning_s = dead_reckoning(materials.mapping.self_motion())
-    semi_metric, mapping_s = map_recording(materials.mapping.observations(), materials.scenario.mapper)
-    map_bytes = save_map(materials.folder / "semi-metric.pbstream", semi_metric, _provenance(materials, SEMI_METRIC))
     at_vertices = Trajectory(semi_metric.t_s, interpolate(reckoned.t_s, reckoned.poses, semi_metric.t_s))
+    map_path = SEMI_METRIC.map_path(materials.folder)
+    map_bytes = save_map(map_path, semi_metric, materials.provenance(SEMI_METRIC))
+    figures = {"map_bytes": map_bytes, **semi_metric_figures(semi_metric, materials.mapping)}
     scored = {
-        DEAD_RECKONING: score_trajectory(at_vertices, truth, metric=False),
-        SEMI_METRIC: score_trajectory(Trajectory(semi_metric.t_s, semi_metric.poses), truth, metric=False),
+        DEAD_RECKONING: score_trajectory(at_vertices, truth, DEAD_RECKONING.alignment),
+        SEMI_METRIC: score_trajectory(Trajectory(semi_metric.t_s, semi_metric.poses), truth, SEMI_METRIC.alignment),
     }
     rows = [
-        _own_frame_row(DEAD_RECKONING, scored, truth, cpu_percent=100 * reckoning_s / duration_s),
-        _own_frame_row(
-            SEMI_METRIC,
-            scored,
-            truth,
-            cpu_percent=100 * mapping_s / duration_s,
-            map_bytes=map_bytes,
-            closures=_closure_figures(semi_metric, materials.mapping),
-            **_counts(semi_metric),
-        ),
+        own_frame_row(DEAD_RECKONING, scored[DEAD_RECKONING], truth, cpu_percent=100 * reckoning_s / duration_s),
+        own_frame_row(SEMI_METRIC, scored[SEMI_METRIC], truth, cpu_percent=100 * mapping_s / duration_s, **figures),
     ]
-    others = rivals(materials, semi_metric.t_s)
-    rows += [_rival_row(rival, truth) for rival in others]
-    scored |= {
-        one.method: one.scored for one in others if one.scored is not None and one.method != NO_ATTRACTOR
-    }  # the same poses
-    found: dict[str, Topometric] = {}
-    for method, mode in MODES:
-        try:
-            found[method] = _topometric(method, mode, semi_metric, materials)
-        except HippodromeError as error:
-            rows.append(Row(method=method, failure=str(error), **_counts(semi_metric)))
-        else:
-            cpu_percent = 100 * (mapping_s + found[method].cpu_s) / duration_s
-            rows.append(_topometric_row(method, found[method], materials.mapping, cpu_percent))
-    scored |= {method: topometric.scored for method, topometric in found.items()}
-    _write_evidence(materials, scored, found)
-    write_map_evidence(materials, scored, found)
-    if task.figures:
-        draw_scenario(materials, semi_metric, scored, found)
-    return _result(materials, rows, mapping_s, found)
+    for rival in run_rivals(materials, semi_metric.t_s):
+        rows.append(rival.row)
+        if rival.scored is not None and rival.method != NO_ATTRACTOR:  # its poses would cover the map's, which are the same
+            scored[rival.method] = rival.scored
+    return rows, scored
 
 
-def _topometric(method: str, mode: Literal["paper", "route"], semi_metric: CognitiveMap, materials: Materials) -> Topometric:
-    """One refinement mode, and localization in its map. Mode ``paper`` is told where the drive began, as the paper's was."""
-    scenario, truth = materials.scenario, materials.mapping.ground_truth()
-    start = StartPose(*(float(value) for value in truth.poses[0])) if mode == "paper" else None
-    refinement, cpu_s = refine_map(semi_metric, materials.roads, refine_config(scenario, mode), start)
+def _refine_and_localize(method: Method, semi_metric: CognitiveMap, materials: Materials) -> TopometricResult:
+    """Refine the map in the method's mode, and localize the second drive in it. Raises HippodromeError if either refuses.
+
+    Mode ``paper`` is told where the mapping drive began, as the paper's own method was.
+    """
+    assert method.mode is not None
+    scenario, roads = materials.scenario, materials.roads
+    start = true_start(materials.mapping) if method.mode == "paper" else None
+    refinement, cpu_s = timed(refine, semi_metric, roads, refine_config(scenario, method.mode), start)
     refined = refinement.cognitive_map
-    map_bytes = save_map(materials.folder / MAP_FILES[mode], refined, _provenance(materials, method))
-    localization = localize_recording(materials.drive.observations(), refined, materials.roads, scenario.localizer)
-    return Topometric(
+    map_bytes = save_map(method.map_path(materials.folder), refined, materials.provenance(method))
+    localization = localize_recording(materials.drive.observations(), Localizer(refined, roads, scenario.localizer))
+    return TopometricResult(
         refinement=refinement,
-        scored=score_trajectory(Trajectory(refined.t_s, refined.poses), truth, metric=True),
+        scored=score_trajectory(Trajectory(refined.t_s, refined.poses), materials.mapping.ground_truth(), method.alignment),
         map_bytes=map_bytes,
         cpu_s=cpu_s,
         localization=localization,
         localized=score_localization(localization.estimates, materials.drive.ground_truth(), localization.step_s),
     )
-
-
-def _errors(scored: Scored) -> dict[str, Any]:
-    return {"ape": summarize(scored.ape), "rpe": summarize(scored.rpe), "rpe_20m": summarize(scored.rpe_20m)}
-
-
-def _own_frame_row(method: str, scored: Mapping[str, Scored], truth: Trajectory, **fields: Any) -> Row:
-    """A row for an estimate in a frame and scale of its own: beside its errors, those after the best rigid and similarity fit."""
-    trajectory = scored[method].trajectory
-    fits = {f"ape_{fit}": summarize(ape(trajectory, truth, fit)) for fit in ("se2", "sim2")}
-    return Row(method=method, **_errors(scored[method]), **fits, **fields)
-
-
-def _rival_row(rival: Rival, truth: Trajectory) -> Row:
-    if rival.scored is None:
-        return Row(method=rival.method, **rival.fields)
-    return _own_frame_row(rival.method, {rival.method: rival.scored}, truth, **rival.fields)
-
-
-def _topometric_row(method: str, topometric: Topometric, recording: Recording, cpu_percent: float) -> Row:
-    refined = topometric.refinement.cognitive_map
-    return Row(
-        method=method,
-        **_errors(topometric.scored),
-        cpu_percent=cpu_percent,
-        map_bytes=topometric.map_bytes,
-        localization=summarize_localization(topometric.localized),
-        lanes=_lane_figures(refined, recording),
-        estimates={name: value if np.isfinite(value) else None for name, value in topometric.refinement.estimates.items()},
-        breaks=[{**asdict(stretch), "status": stretch.status.name} for stretch in topometric.refinement.breaks],
-        **_counts(refined),
-    )
-
-
-def _counts(cognitive_map: CognitiveMap) -> dict[str, Any]:
-    return {"vertices": len(cognitive_map.t_s), "edges": len(cognitive_map.edges.source)}
-
-
-def _closure_figures(cognitive_map: CognitiveMap, recording: Recording) -> dict[str, Any]:
-    """Closures against truth: a figure of the harness, the mapper never sees it."""
-    truth = recording.ground_truth()
-    true_poses = interpolate(truth.t_s, truth.poses, cognitive_map.t_s)
-    found = score_closures(*closures(cognitive_map), true_poses, cognitive_map.t_s)
-    return {**asdict(found), "precision": found.precision, "recall": found.recall}
-
-
-def _lane_figures(cognitive_map: CognitiveMap, recording: Recording) -> dict[str, Any] | None:
-    if cognitive_map.road_match is None:
-        return None
-    samples = recording.samples
-    steps = np.clip(np.searchsorted(samples.t_s, cognitive_map.t_s), 0, len(samples.t_s) - 1)
-    true = [samples.lane_ids[lane] for lane in samples.lane[steps]]
-    accuracy = matched_lane_accuracy(matched_lane_ids(cognitive_map.road_match), true)
-    return {**asdict(accuracy), "share_right": accuracy.share_right, "precision": accuracy.precision}
-
-
-def _result(materials: Materials, rows: list[Row], mapping_s: float, found: Mapping[str, Topometric]) -> ScenarioResult:
-    scenario = materials.scenario
-    tours = {
-        role: recording.manifest["tour"]
-        for role, recording in (("mapping", materials.mapping), ("localization", materials.drive))
-    }
-    return ScenarioResult(
-        name=scenario.name,
-        seed=scenario.seed,
-        network=_network(materials),
-        noise=scenario.noise_name,
-        frames=materials.mapping.frame_count,
-        duration_s=materials.duration_s,
-        rows=tuple(rows),
-        tours=tours,
-        town_notes=list(materials.town.notes),
-        configuration=_configuration(scenario),
-        timings={
-            "mapping_cpu_s": mapping_s,
-            **{f"{method}: refinement_cpu_s": one.cpu_s for method, one in found.items()},
-            **{f"{method}: localization_step_ms": 1e3 * float(one.localization.step_s.mean()) for method, one in found.items()},
-        },
-    )
-
-
-def _network(materials: Materials) -> Network:
-    """Size of the road network: directed edges, and their length along the rightmost lane."""
-    roads, spec = materials.town.network, materials.scenario.town
-    is_road = ~roads.is_internal
-    first_lane = np.unique(roads.lane_edge[is_road], return_index=True)[1]
-    km = float(roads.lane_lengths_m()[is_road][first_lane].sum()) / 1e3
-    return Network(
-        path=portable(spec.network) if spec.network else None,
-        generator=None if spec.network else spec.kind,
-        edges=len(first_lane),
-        km=km,
-    )
-
-
-def _configuration(scenario: Scenario) -> dict[str, Any]:
-    """The effective configuration; a network file is named so that results do not depend on where it lies."""
-    values: dict[str, Any] = json.loads(scenario.model_dump_json())  # JSON has no infinity: such a limit becomes null
-    if scenario.town.network is not None:
-        values["town"]["network"] = portable(scenario.town.network)
-    return values
-
-
-def _provenance(materials: Materials, method: str) -> dict[str, str]:
-    configuration = json.dumps(_configuration(materials.scenario), sort_keys=True)
-    return {"method": method, "scenario": configuration, "recording": materials.mapping.folder.name}
-
-
-def _write_evidence(materials: Materials, scored: Mapping[str, Scored], found: Mapping[str, Topometric]) -> None:
-    """Every figure in the tables can be computed again from these files, with evo for one."""
-    folder = materials.folder
-    write_tum(folder / "ground-truth.tum", materials.mapping.ground_truth())
-    write_tum(folder / "localization-ground-truth.tum", materials.drive.ground_truth())
-    for method, one in scored.items():
-        write_tum(folder / f"{file_stem(method)}.tum", one.trajectory)
-    for method, topometric in found.items():
-        known = [estimate for estimate in topometric.localization.estimates if estimate.localized]
-        if known:
-            poses = np.stack([estimate.pose for estimate in known])
-            write_tum(folder / f"{file_stem(method)}-localization.tum", Trajectory(np.array([e.t_s for e in known]), poses))
-    text = json.dumps(_configuration(materials.scenario), indent=1, sort_keys=True) + "\n"
-    write_atomically(folder / "scenario.json", text.encode())

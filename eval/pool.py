@@ -21,7 +21,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from hippodrome.core.types import HippodromeError
 
-INTERRUPTED = 130  # the shell's status for an interrupt
+INTERRUPTED = 130  # exit status by which a shell knows a process that was interrupted
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
 
@@ -42,16 +42,27 @@ class Workers:
         weight: Callable[[TaskT], int] = lambda _: 1,
         follow: Callable[[ResultT], TaskT | None] = lambda _: None,
     ) -> list[ResultT]:
-        """``task`` of each of ``tasks``; the first error stops the stage, and what is already on disk stays there.
+        """Run ``task`` on each of ``tasks``. The first error stops the stage; what is on disk by then stays there.
 
-        ``follow`` may answer a result with one task more, which is begun as soon as a process is free.
+        Args:
+            stage: Name of the stage for the progress display and for errors.
+            task: What each process does with a task.
+            tasks: The tasks.
+            weight: How much a task counts in the progress display.
+            follow: May answer a result with one more task, which is begun as soon as a process is free.
+
+        Returns:
+            The results in the order of the tasks, those of the tasks that followed at the end.
+
+        Raises:
+            HippodromeError: A process died, or what a task raised.
         """
         bar = self.progress.add_task(stage, total=sum(weight(item) for item in tasks))
         futures = {self.executor.submit(perform, task, item): weight(item) for item in tasks}
         pending = set(futures)
         try:
             while pending:
-                # In turns, for an interrupt from the keyboard to be heard at once.
+                # Waiting for a short time at once, so that an interrupt from the keyboard takes effect without delay.
                 done, pending = wait(pending, timeout=0.2, return_when="FIRST_COMPLETED")
                 for future in done:
                     self.progress.advance(bar, futures[future])
@@ -72,14 +83,14 @@ class Workers:
 
 @contextmanager
 def worker_pool(workers: int) -> Iterator[Workers]:
-    """``workers`` processes with a progress display."""
+    """``workers`` processes with a progress display; they end with the context."""
     with process_pool(workers) as executor, progress_bar() as progress:
         yield Workers(executor, progress, workers)
 
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """``workers`` fresh processes: SUMO and GL keep state that must not be inherited, so they are spawned, not forked."""
+    """``workers`` processes. They are spawned, not forked, as SUMO and GL keep state that must not be inherited."""
     executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker)
     try:
         yield executor
@@ -88,7 +99,7 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def progress_bar() -> Progress:
-    """A display for a terminal; nothing where there is none."""
+    """A progress display for a terminal; without a terminal it shows nothing."""
     columns = (
         TextColumn("{task.description:<10}"),
         BarColumn(bar_width=40),
@@ -102,24 +113,27 @@ def progress_bar() -> Progress:
 
 
 def one_opencv_thread() -> None:
-    """For this process: on images as small as ours its threads wait busily for one another, a third of a look's CPU time."""
+    """Let OpenCV use one thread in this process.
+
+    On images as small as ours its threads mostly wait for one another, which took a third of the CPU time of a query frame.
+    """
     cv2.setNumThreads(1)
 
 
 def _quiet_worker() -> None:
-    """One process, one core: the pool is the parallelism. Libraries' banners on standard output do not belong to ours."""
+    """Set up a worker: it uses one core, as the pool is the parallelism, and what libraries print goes to standard error."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     one_opencv_thread()
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as a shell has it for what runs in the background
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a shell lets commands in the background ignore interrupts
         signal.signal(signal.SIGINT, _leave)
     sys.stdout = sys.stderr
 
 
 def perform(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT:
-    """``task`` of ``item`` in a worker. Interrupted, the task clears away what it has begun, and its process ends.
+    """Run ``task`` on ``item`` in a worker. If it is interrupted, the task clears away what it has begun, and the process ends.
 
-    The executor would take the exit for the task's own failure and begin the next one.
+    Without this, the executor would take the exit for a failure of the task and begin the next one.
     """
     try:
         return task(item)
@@ -128,9 +142,10 @@ def perform(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT:
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
-    """An interrupt from the keyboard reaches every process; one of them says so, the others end without a traceback.
+    """End a worker without a traceback: an interrupt from the keyboard reaches every process, and the main one reports it.
 
-    A worker between two tasks may find a message in the queue that another one has left half read: hence no more words.
+    Nothing that follows may print either: a worker between two tasks may find a message in the queue that another one has left
+    half read, and would complain.
     """
     sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115  # until the process ends
     raise SystemExit(INTERRUPTED)

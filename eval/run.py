@@ -1,4 +1,8 @@
-"""``hippodrome eval``: scenarios in, ``results.json``, tables and figures out. Three rounds over one pool of processes."""
+"""``hippodrome eval`` and ``render``: scenarios in, ``results.json``, tables and figures out.
+
+The work is done in rounds over one pool of processes: simulate every drive, draw every chunk of frames, evaluate every scenario.
+The tasks of a round do not depend on one another, and no result depends on the number of processes.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +13,16 @@ from pathlib import Path
 
 from rich.console import Console
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.pool import Workers, worker_pool
 from hippodrome.eval.report.report import REPORT, write_report
-from hippodrome.eval.results.model import Results, ScenarioResult, write_results
+from hippodrome.eval.results.model import Results, write_results
 from hippodrome.eval.results.paper_rows import quoted_rows
 from hippodrome.eval.results.tables import print_table_one, table_one_markdown
 from hippodrome.eval.results.thresholds import failed_limits
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import ROLES, RecordingPlan, finish, prepare, render_chunk
 from hippodrome.sim.recording import CHUNK_FRAMES
 from hippodrome.sim.render.probe import require_gl
@@ -28,13 +32,24 @@ RESULTS = "results.json"
 
 
 def evaluate(paths: Sequence[Path], network: Path | None, seed: int | None, workers: int, out: Path) -> bool:
-    """Evaluate scenarios into ``out`` and show the tables; whether all their thresholds hold. Raises HippodromeError."""
+    """Evaluate scenarios and print their tables. Returns whether all their thresholds hold.
+
+    Args:
+        paths: Scenario files.
+        network: Road network that replaces the scenarios' own.
+        seed: Seed that replaces the scenarios' own.
+        workers: Number of processes.
+        out: Folder for all files.
+
+    Raises:
+        HippodromeError: A scenario or its network cannot be used.
+    """
     scenarios = load_scenarios(paths, network, seed)
     return _report(scenarios, run_scenarios(scenarios, workers, out), out)
 
 
 def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path) -> Results:
-    """Results of scenarios, also as files in ``out``: ``results.json``, tables, figures, report."""
+    """Evaluate scenarios and write ``results.json``, tables, figures and report into ``out``. Raises HippodromeError."""
     require_gl()
     plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
     with worker_pool(workers) as pool:
@@ -49,7 +64,7 @@ def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path) -> Res
 
 
 def render(paths: Sequence[Path], network: Path | None, seed: int | None, workers: int, out: Path) -> None:
-    """Make the recordings of scenarios and print where they are."""
+    """Make the recordings of scenarios and print where they are; arguments as for ``evaluate``. Raises HippodromeError."""
     scenarios = load_scenarios(paths, network, seed)
     require_gl()
     plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
@@ -60,7 +75,7 @@ def render(paths: Sequence[Path], network: Path | None, seed: int | None, worker
 
 
 def load_scenarios(paths: Sequence[Path], network: Path | None, seed: int | None) -> list[Scenario]:
-    """All scenarios, each with a name of its own: results are filed under it."""
+    """Read scenarios. Raises HippodromeError if one cannot be used, or if two have one name, as results are filed by name."""
     scenarios = [read_scenario(path, network, seed) for path in paths]
     name, times = Counter(scenario.name for scenario in scenarios).most_common(1)[0]
     if times > 1:
@@ -69,7 +84,7 @@ def load_scenarios(paths: Sequence[Path], network: Path | None, seed: int | None
 
 
 def make_recordings(plans: Sequence[RecordingPlan], pool: Workers) -> None:
-    """Simulate, then draw, whatever is not on disk yet."""
+    """Simulate and draw the drives that are not on disk yet."""
     chunks = pool.run("simulate", prepare, plans)
     pool.run("render", _render_chunk, [(plan, chunk) for plan, missing in zip(plans, chunks, strict=True) for chunk in missing],
              weight=lambda _: CHUNK_FRAMES)  # fmt: skip
@@ -85,7 +100,7 @@ def _finish(plan: RecordingPlan) -> None:
 
 
 def _report(scenarios: Sequence[Scenario], results: Results, out: Path) -> bool:
-    """Say on the terminal what came out; whether all limits hold."""
+    """Print tables, thresholds that do not hold, and where the files are. Returns whether all thresholds hold."""
     print_table_one(results, quoted_rows(), Console())
     failures = [
         f"{result.name}: {limit}"
@@ -96,8 +111,3 @@ def _report(scenarios: Sequence[Scenario], results: Results, out: Path) -> bool:
         print(f"threshold failed: {failure}", file=sys.stderr)
     print(f"\nresults: {out / RESULTS}\ntables:  {out / 'table1.md'}\nfigures: {out}/<scenario>/*.png\nreport:  {out / REPORT}")
     return not failures
-
-
-def result_of(results: Results, name: str) -> ScenarioResult:
-    """The result of the scenario ``name``."""
-    return next(result for result in results.scenarios if result.name == name)

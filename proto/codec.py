@@ -31,12 +31,12 @@ _FRAMES: Final = {"semi-metric": wire.Header.SEMI_METRIC, "network": wire.Header
 _KINDS: Final = {"gradient": wire.ViewCells.GRADIENT, "grey": wire.ViewCells.GREY}
 
 
-def save_map(path: Path | str, cognitive_map: CognitiveMap, provenance: Mapping[str, str]) -> int:
+def save_map(path: Path | str, cognitive_map: CognitiveMap, provenance: Mapping[str, str] | None = None) -> int:
     """Write a map atomically and return its size in bytes. The same map and provenance give the same bytes."""
     path = Path(path)
     try:
         check_map(cognitive_map)
-        messages = encode_map(cognitive_map, provenance)
+        messages = encode_map(cognitive_map, provenance or {})
     except FieldError as error:
         raise HippodromeError(f"{path}: not written, the map is invalid: {error}") from error
     return write_stream(path, FORMAT_VERSION, [message.SerializeToString(deterministic=True) for message in messages])

@@ -16,8 +16,8 @@ import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
-from hippodrome.proto.atomic import write_atomically
 
 MAGIC = b"\x89HIPPO\r\n"  # high bit and line end, as in PNG: a transfer in text mode breaks it visibly
 COMPRESSION_LEVEL = 6  # fixed: the same map gives the same bytes; 9 saves little and takes several times as long

@@ -9,8 +9,8 @@ import zlib
 from pathlib import Path
 from typing import Final
 
+from hippodrome._files import replacing, sha256_of
 from hippodrome.core.types import HippodromeError
-from hippodrome.sim.files import replacing, sha256_of
 from hippodrome.sim.sumo_tools import run_tool
 
 SUMO: Final = (".net.xml", ".net.xml.gz")

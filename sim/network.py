@@ -28,8 +28,19 @@ HELD_PHASE_S: Final = 150.0  # no driver waits that long: such a traffic light i
 COINCIDENT_M: Final = 1.0  # nodes closer than this are one crossing to a driver
 
 
-def read_network(net_file: Path) -> RoadNetwork:
-    """The lanes of a SUMO network (``.net.xml`` or ``.net.xml.gz``) that passenger cars may use."""
+def read_network(net_file: Path | str) -> RoadNetwork:
+    """The lanes of a SUMO network that passenger cars may use.
+
+    Args:
+        net_file: ``.net.xml`` or ``.net.xml.gz``, as SUMO, netconvert and netgenerate write it.
+
+    Returns:
+        Lane centrelines in metres, x east and y north of the network's own origin, and how they connect.
+
+    Raises:
+        HippodromeError: the file is unreadable, no SUMO network, or has no lane for cars; the message says which and the cure.
+    """
+    net_file = Path(net_file)
     return road_network(load_net(net_file), net_file)
 
 

@@ -13,10 +13,10 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from hippodrome._files import PACKAGE, code_sha256, sha256_of
 from hippodrome.core.types import Frame
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.episode import Samples, camera_divider, draw_frame, sample_drive
-from hippodrome.sim.files import sha256_of
 from hippodrome.sim.recording import (
     CHUNK_FRAMES,
     MANIFEST,
@@ -39,6 +39,7 @@ from hippodrome.sim.types import Drive, Town, TrafficLog
 
 Role: TypeAlias = Literal["mapping", "localization"]
 ROLES: tuple[Role, ...] = ("mapping", "localization")
+RECORDING_CODE = ("sim/**/*.py",)  # the code that makes recordings: a changed renderer must not be served old frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,7 @@ class RecordingPlan:
             "odometry_rate_hz": scenario.odometry_rate_hz,
             "noise": scenario.self_motion_noise.model_dump(mode="json"),
             "versions": {name: version(name) for name in ("eclipse-sumo", "highway-env", "numpy", "pyrender")},
-            "code_sha256": _code_sha256(),
+            "code_sha256": code_sha256(PACKAGE, RECORDING_CODE),
         }
 
     def folder(self) -> Path:
@@ -87,16 +88,6 @@ class RecordingPlan:
 @lru_cache(maxsize=4)
 def _town(scenario: Scenario, root: Path) -> Town:
     return build_town(scenario.town, scenario.seed, root / "towns")
-
-
-@lru_cache(maxsize=1)
-def _code_sha256() -> str:
-    """Of the code that makes recordings: a changed renderer must not be served old frames."""
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(path.relative_to(Path(__file__).parent).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def prepare(plan: RecordingPlan) -> list[int]:

@@ -19,9 +19,9 @@ from typing import Any
 import cv2
 import numpy as np
 
+from hippodrome._files import replacing, sha256_of
 from hippodrome.core.types import Frame, HippodromeError, Observation, Step, Trajectory
 from hippodrome.sim.episode import Samples
-from hippodrome.sim.files import replacing, sha256_of
 
 FORMAT = 1
 CHUNK_FRAMES = 250  # a few seconds of rendering: what a kill can cost at most, and what a second process can take over

@@ -1,4 +1,8 @@
-"""Head-direction network: a ring of integrator and calibration cells. Small immutable state, pure step functions."""
+"""Head-direction cells: one attractor network on a ring, for the heading. An immutable state, and pure functions on it.
+
+The functions come in the order of a tick: ``integrate`` self-motion, ``inhibit``, and now and then ``inject`` what a view says.
+``challenge`` and ``adopt`` are for views that contradict the belief: the populations then hold two beliefs that compete.
+"""
 
 from __future__ import annotations
 
@@ -14,19 +18,19 @@ from hippodrome.core.types import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeadDirectionState:
-    """Beliefs of the two populations: ``mean_rad`` (2,), ``reliability`` (2,) in 1/rad^2."""
+    """Beliefs of the two populations, integrator first."""
 
-    mean_rad: FloatArray
-    reliability: FloatArray
+    mean_rad: FloatArray  # (2,)
+    reliability: FloatArray  # (2,) 1/rad^2
 
 
 def uniform(config: AttractorConfig) -> HeadDirectionState:
-    """No prior knowledge: both populations flat."""
+    """No prior knowledge: both populations as good as flat."""
     return HeadDirectionState(np.zeros(2), np.full(2, config.floor * config.information))
 
 
 def known(heading_rad: float, config: AttractorConfig) -> HeadDirectionState:
-    """A known heading: the integrator holds E, the calibration cells their share of it."""
+    """A known heading: the integrator holds the information E, the calibration cells their share of it."""
     reliability = config.information * np.array([1.0, config.calibration_share])
     return HeadDirectionState(np.full(2, wrap_compiled(heading_rad)), reliability)
 
@@ -34,7 +38,10 @@ def known(heading_rad: float, config: AttractorConfig) -> HeadDirectionState:
 def integrate(
     state: HeadDirectionState, omega_radps: float, dt_s: float, sq_sigma_rad: tuple[float, float] = (0.0, 0.0)
 ) -> HeadDirectionState:
-    """Path integration: both peaks turn by omega dt; the motion adds ``sq_sigma_rad`` to each's variance (0: as printed)."""
+    """Path integration: both means turn by omega dt, and the motion's variance (integrator, calibration) is added to theirs.
+
+    The paper adds no variance: ``sq_sigma_rad`` of zeros leaves the reliabilities alone, as printed.
+    """
     turned = omega_radps * dt_s
     (mu_inte, mu_cali), (r_inte, r_cali) = state.mean_rad.tolist(), state.reliability.tolist()
     mean = np.array([wrap_compiled(mu_inte + turned), wrap_compiled(mu_cali + turned)])
@@ -44,35 +51,36 @@ def integrate(
 
 
 def inhibit(state: HeadDirectionState, dt_s: float, config: AttractorConfig) -> HeadDirectionState:
-    """Mutual and global inhibition, Eqs. (3)-(7), Li et al. 2025."""
+    """Mutual and global inhibition over ``dt_s``, Eqs. (3)-(7), Li et al. 2025."""
     mean, reliability = state.mean_rad.reshape(1, 2, 1), state.reliability.reshape(1, 2, 1)
     inhibited = attractor.inhibit(mean, reliability, dt_s, config, np.array([config.information]))
     return HeadDirectionState(state.mean_rad, inhibited.reshape(2))
 
 
 def stimulate(state: HeadDirectionState, heading_rad: float, reliability: float) -> HeadDirectionState:
-    """Eqs. (13)-(14), Li et al. 2025, on the calibration cells."""
+    """A view speaks for ``heading_rad``: Eqs. (13)-(14), Li et al. 2025, on the calibration cells alone."""
     mu_cali, r_cali = attractor.inject(state.mean_rad[CALIBRATION], state.reliability[CALIBRATION], heading_rad, reliability)
     return HeadDirectionState(np.array([state.mean_rad[INTEGRATOR], mu_cali]), np.array([state.reliability[INTEGRATOR], r_cali]))
 
 
 def inject(state: HeadDirectionState, heading_rad: float, reliability: float, config: AttractorConfig) -> HeadDirectionState:
-    """One injection: Eqs. (13)-(14), Li et al. 2025; mode "bounded" then hands the fused belief back to both populations."""
+    """``stimulate``, Eqs. (13)-(14), Li et al. 2025; in mode "bounded" then ``hand_back``."""
     stimulated = stimulate(state, heading_rad, reliability)
     return stimulated if config.mode == "paper" else hand_back(stimulated, config)
 
 
 def hand_back(state: HeadDirectionState, config: AttractorConfig) -> HeadDirectionState:
-    """The fused belief of Eqs. (15)-(16) to both populations, total information kept. Without it an injection never
-    reaches the integrator (nothing in the printed equations moves from one population to the other).
+    """Both populations take over the fused belief of Eqs. (15)-(16) and share its information: mode "bounded" only.
+
+    A departure: as printed nothing moves from one population to the other, so that an injection never reaches the integrator and
+    is forgotten as soon as the calibration cells are inhibited.
     """
     heading_rad, reliability = read_out(state)
-    shares = np.array([1.0 - config.calibration_share, config.calibration_share])
-    return HeadDirectionState(np.full(2, heading_rad), reliability * shares)
+    return _shared(heading_rad, reliability, config)
 
 
 def challenge(state: HeadDirectionState, heading_rad: float, reliability: float) -> HeadDirectionState:
-    """Calibration cells leave for a conflicting heading; the integrator keeps its own, and the two compete."""
+    """The calibration cells take over a conflicting heading; the integrator keeps its own, and the two compete."""
     return HeadDirectionState(
         np.array([state.mean_rad[INTEGRATOR], wrap_compiled(heading_rad)]),
         np.array([state.reliability[INTEGRATOR], reliability]),
@@ -80,13 +88,18 @@ def challenge(state: HeadDirectionState, heading_rad: float, reliability: float)
 
 
 def adopt(state: HeadDirectionState, population: int, config: AttractorConfig) -> HeadDirectionState:
-    """The conflict is decided: both populations snap to the winning one's belief (blending would please neither)."""
+    """The conflict is decided: both populations snap to the belief of the winning ``population``; a mean would fit neither."""
+    return _shared(state.mean_rad[population], state.reliability[population], config)
+
+
+def _shared(heading_rad: float, reliability: float, config: AttractorConfig) -> HeadDirectionState:
+    """One belief in both populations, its information divided between them."""
     shares = np.array([1.0 - config.calibration_share, config.calibration_share])
-    return HeadDirectionState(np.full(2, state.mean_rad[population]), state.reliability[population] * shares)
+    return HeadDirectionState(np.full(2, heading_rad), reliability * shares)
 
 
 def read_out(state: HeadDirectionState) -> tuple[float, float]:
-    """Eqs. (15)-(16), Li et al. 2025: heading_rad and its reliability in 1/rad^2."""
+    """The fused belief of both populations, Eqs. (15)-(16), Li et al. 2025: heading in rad and its reliability in 1/rad^2."""
     (mu_inte, mu_cali), (r_inte, r_cali) = state.mean_rad.tolist(), state.reliability.tolist()
     heading_rad, reliability = attractor.read_out(mu_inte, r_inte, mu_cali, r_cali)
     return float(heading_rad), float(reliability)

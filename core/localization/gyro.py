@@ -1,7 +1,8 @@
-"""White noise of the yaw rate, told from the signal itself: vehicles turn smoothly, what changes between samples is noise.
+"""White noise of the yaw rate, estimated from the signal itself.
 
-A filter that trusts a noisy gyro holds on to a wrong heading, and the heading error becomes one of position. A noisy one shows
-before any view tells: in the second differences of its samples.
+A filter that trusts a noisy gyro holds on to a wrong heading, and the heading error becomes one of position. Vehicles turn
+smoothly: what changes from sample to sample is noise. The second differences of the samples therefore show how noisy the gyro is,
+long before any view tells.
 """
 
 from __future__ import annotations
@@ -9,13 +10,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-MEDIAN_PER_SIGMA = 0.6745 * math.sqrt(6.0)  # of the magnitude of the second differences of white noise: variances 1 + 4 + 1
-RATE = 0.05  # of the logarithm per sample: a tenfold change is followed in 5 s, and the median wanders by a tenth
+# Median magnitude of the second differences of white noise, per standard deviation of the noise: their variance is
+# 1 + 4 + 1 times that of the noise, and the median magnitude of a Gaussian is 0.6745 of its standard deviation.
+MEDIAN_PER_SIGMA = 0.6745 * math.sqrt(6.0)
+RATE = 0.05  # step of ln(sigma) per sample: a tenfold change is followed in 5 s, and the estimate wanders by a tenth
 
 
 @dataclass(frozen=True, slots=True)
 class GyroNoise:
-    """The last two samples and the running estimate; 0 before there is one."""
+    """The last two yaw rates, how many there have been, and the standard deviation estimated so far (0: none yet)."""
 
     before_radps: float = 0.0
     last_radps: float = 0.0
@@ -24,9 +27,15 @@ class GyroNoise:
 
 
 def update(state: GyroNoise, yaw_rate_radps: float, least_radps: float) -> GyroNoise:
-    """One sample more: the sigma steps towards the median, which the few samples of a junction's beginning do not move.
+    """Take one yaw rate in.
 
-    ``least_radps`` is the smallest sigma that is told apart from none.
+    Sigma takes a step towards the value at which the second differences lie above and below their median equally often. The few
+    samples at the beginning of a turn, which no smooth motion explains, hardly move a median.
+
+    Args:
+        state: the estimate so far.
+        yaw_rate_radps: the new sample.
+        least_radps: sigma is never taken to be smaller.
     """
     sigma = max(state.sigma_radps, least_radps)
     if state.samples >= 2:

@@ -1,6 +1,6 @@
-"""Recognising places of a topometric map: a frame is scored against all view cells, the scores are filtered along its paths.
+"""Place recognition in a topometric map: each query frame is scored against the view cells, the scores are filtered along paths.
 
-No pose is believed here: what comes out is the cell that stands out, and by how much. ``core.localizer`` makes poses of it.
+No pose is believed here: what comes out is the cell that stands out, and by how much. The localizer makes poses of it.
 """
 
 from __future__ import annotations
@@ -9,82 +9,89 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hippodrome.core.localization import places as localizer_places
 from hippodrome.core.localization.config import LocalizerConfig
-from hippodrome.core.localization.places import Places
+from hippodrome.core.localization.places import PlaceMap, interpolated_pose, likely_cells, margin
 from hippodrome.core.types import Float32Array, FloatArray, Frame, HippodromeError, IntArray
-from hippodrome.core.views import descriptors as view_cells
-from hippodrome.core.views import index as view_search
-from hippodrome.core.views.index import Found
+from hippodrome.core.views.descriptors import describe
+from hippodrome.core.views.index import ScoredViews, index_of, search
+from hippodrome.core.views.scoring import start_query_mean, update_query_mean
+from hippodrome.core.views.sequence import Step, propagate
 
-NOWHERE: IntArray = np.zeros(0, dtype=np.int32)
+NO_CELLS: IntArray = np.zeros(0, dtype=np.int32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recognised:
-    """What one look shows."""
+class PlaceMatch:
+    """What one query frame shows."""
 
-    found: Found
-    cell: int  # the best after filtering
-    margin: float  # how far it stands out from the best elsewhere
+    scored: ScoredViews  # the cells that the frame was scored against, and their similarities
+    cell: int  # the cell with the most evidence after filtering
+    margin: float  # how far its evidence stands out from that of the best cell elsewhere
 
 
 class PlaceRecogniser:
-    """Feed it frames in order; ``sequence.memory`` 0 makes each look stand alone.
+    """Give it the query frames of a drive in order. With ``sequence.memory`` 0 each frame stands alone.
 
-    Raises HippodromeError where the localizer's view cells are not of the map's kind and shape.
+    Raises:
+        HippodromeError: the localizer's view cells are not of the kind and shape of the map's.
     """
 
-    def __init__(self, places: Places, config: LocalizerConfig) -> None:
+    def __init__(self, places: PlaceMap, config: LocalizerConfig) -> None:
         own, mapped = (config.views.kind, config.views.shape), (places.bank.kind, tuple(places.bank.shape))
         if own != mapped:
             raise HippodromeError(
                 f"the map's view cells are {mapped[0]} of shape {mapped[1]}, the localizer's {own[0]} of shape {own[1]}: "
                 "give `localizer.views` the values that `mapper.memory.view_cells` had"
             )
-        gradient, sequence = places.bank.kind == "gradient", config.sequence
         self._places, self._config = places, config
-        self._spread_floor = sequence.sigma_floor if gradient else sequence.grey_sigma_floor
-        self._index = view_search.index_of(places.bank, config.search)
+        self._spread_floor = config.sequence.floor(places.bank.kind)
+        self._tolerance = Step(config.step_tolerance_m, config.sequence.turn_tolerance_rad)
+        self._index = index_of(places.bank, config.search)
         self._filtered: Float32Array = np.zeros(len(places.poses_m), dtype=np.float32)
-        self._query_mean = view_cells.start_query_mean(places.bank.mean, config.mean_trust)
+        self._query_mean = start_query_mean(places.bank.mean, config.mean_trust)
 
-    def look(self, frame: Frame, step_m: float, turned_rad: float, believed: IntArray = NOWHERE) -> Recognised:
-        """One frame, and the motion since the last; ``believed`` cells are scored whatever the frame is like."""
+    def recognise(self, frame: Frame, driven: Step, believed: IntArray = NO_CELLS) -> PlaceMatch:
+        """The place that a query frame shows.
+
+        Args:
+            frame: the query frame.
+            driven: motion since the query frame before; its length in metres.
+            believed: cells of the place where the vehicle is believed to be: scored whatever the frame is like.
+        """
         config, places = self._config, self._places
-        descriptor = view_cells.describe(frame, config.views)
-        self._query_mean = view_cells.update_query_mean(self._query_mean, descriptor, config.views)
-        likely = believed
+        descriptor = describe(frame, config.views)
+        self._query_mean = update_query_mean(self._query_mean, descriptor, config.views)
+        candidates = believed
         if self._index is not None:
-            expected = localizer_places.expected(places, self._filtered, config.search.hypotheses)
-            likely = np.concatenate([expected, believed])
+            candidates = np.concatenate([likely_cells(places, self._filtered, config.search.hypotheses), believed])
         query = descriptor, self._query_mean
-        found = view_search.search(places.bank, self._index, likely, query, config.views, config.search)
-        self._filtered = self._filter(found, step_m, turned_rad)
+        scored = search(places.bank, self._index, candidates, query, config.views, config.search)
+        self._filtered = self._evidence(scored, driven)
         cell = int(np.argmax(self._filtered))
-        return Recognised(found, cell, localizer_places.margin(places, self._filtered, cell))
+        return PlaceMatch(scored, cell, margin(places, self._filtered, cell))
 
-    def z_score(self, found: Found, similarity: Float32Array | float) -> Float32Array | float:
-        """How far a similarity lies above that of all places, in their standard deviations."""
-        return (similarity - found.mean) / max(found.spread, self._spread_floor)
+    def z_score(self, scored: ScoredViews, similarity: Float32Array | float) -> Float32Array | float:
+        """How far a similarity lies above the mean of all cells, in their standard deviations."""
+        return (similarity - scored.mean) / max(scored.spread, self._spread_floor)
 
-    def pose(self, seen: Recognised) -> FloatArray:
+    def pose(self, match: PlaceMatch) -> FloatArray:
         """Pose (3,) of the recognised cell, interpolated between views."""
         similarity = np.full(len(self._places.poses_m), np.nan, dtype=np.float32)
-        similarity[seen.found.cells] = seen.found.similarity
-        return localizer_places.interpolated_pose(self._places, similarity, seen.cell)
+        similarity[match.scored.cells] = match.scored.similarity
+        return interpolated_pose(self._places, similarity, match.cell)
 
-    def _filter(self, found: Found, step_m: float, turned_rad: float) -> Float32Array:
+    def _evidence(self, scored: ScoredViews, driven: Step) -> Float32Array:
+        """Sequence evidence (C,) after a query frame; too few cells make no statistics, and get z-scores of zero."""
         sequence, places = self._config.sequence, self._places
         enough = len(places.poses_m) >= sequence.min_cells
-        z = np.asarray(self.z_score(found, found.similarity) if enough else np.zeros_like(found.similarity), dtype=np.float32)
-        filtered: Float32Array = localizer_places.propagate(
+        z = self.z_score(scored, scored.similarity) if enough else np.zeros_like(scored.similarity)
+        filtered: Float32Array = propagate(
             self._filtered,
-            found.cells,
-            z,
-            (places.link_start, places.link_from, places.link_length_m, places.link_turn_rad),
-            (step_m, turned_rad),
-            (self._config.step_tolerance_m, sequence.turn_tolerance_rad),
+            scored.cells,
+            np.asarray(z, dtype=np.float32),
+            places.predecessors,
+            driven,
+            self._tolerance,
             np.float32(sequence.memory),
         )
         return filtered

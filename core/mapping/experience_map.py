@@ -1,7 +1,8 @@
-"""The experience map: a vertex per visit, an edge per driven step and per loop closure, and how its poses relax.
+"""The experience map: a vertex for each keyframe, an edge for each driven step and each loop closure, and how its poses relax.
 
-Edges hold raw odometry. The attractor read-out jumps at injections, so edges taken from it could never be matched to roads.
-Vertices are never merged: a visit's time and motion would be lost with it.
+Two departures from the paper. Edges hold raw odometry: the read-out of the attractor networks jumps at injections, so that edges
+taken from it could never be matched to roads. Vertices are never merged, even where a place is recognised: the time and the
+motion of a keyframe would be lost with its vertex.
 """
 
 from __future__ import annotations
@@ -13,27 +14,30 @@ import numpy as np
 from numba import njit
 
 from hippodrome.core import se2
-from hippodrome.core.mapping.pose_graph import PoseGraphConfig, optimise
+from hippodrome.core.mapping.pose_graph import PoseGraphConfig, relax_pose_graph
 from hippodrome.core.types import EdgeKind, Edges, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
 class ExperienceMapConfig:
-    """Standard deviations of the edges: lengths relative to the way driven or to the view spacing, so that no unit enters."""
+    """Standard deviations of the edges, and how the poses relax.
+
+    Lengths are relative to the way driven or to the spacing of keyframes, so that no unit of length enters.
+    """
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
     relaxation: Literal["robust", "ratslam"] = "robust"
     pose_graph: PoseGraphConfig = field(default_factory=PoseGraphConfig)
-    odometry_along: float = 0.1  # of the step: slow drift of the scale, as a random walk
-    odometry_across: float = 0.02  # of the step
-    odometry_turn_rad: float = 0.02  # per step: some tens of degrees over a thousand
-    closure_along: float = 0.2  # view spacings: 1 m at 5 m
-    closure_across: float = 0.1  # view spacings
+    odometry_along: float = 0.1  # sigma of a driven step's length, as a share of it: covers the slow drift of the scale
+    odometry_across: float = 0.02  # sigma of a driven step sideways, as a share of its length
+    odometry_turn_rad: float = 0.02  # sigma of the turn of a driven step: some tens of degrees over a thousand steps
+    closure_along: float = 0.2  # sigma of a closure along the road, in distances between two keyframes: 1 m at 5 m
+    closure_across: float = 0.1  # sigma of a closure across the road, in distances between two keyframes
     closure_turn_rad: float = 0.06
-    steady_reach: float = 3.0  # view spacings before and after: longer, and the drift of the scale outweighs the median
-    ratslam_correction: float = 0.5  # share of each link's error that is corrected per sweep
-    ratslam_sweeps: int = 100  # RatSLAM relaxes a few sweeps per frame; at the end of a drive it has had thousands
+    steady_reach: float = 3.0  # distances between keyframes over which closures share a median offset, before and after
+    ratslam_correction: float = 0.5  # share of each edge's error that RatSLAM's relaxation corrects in one sweep
+    ratslam_sweeps: int = 100  # sweeps of RatSLAM's relaxation; RatSLAM itself does a few a frame, thousands in a drive
 
     def __post_init__(self) -> None:
         odometry = (self.odometry_along, self.odometry_across, self.odometry_turn_rad)
@@ -46,17 +50,17 @@ class ExperienceMapConfig:
 
 @dataclass(frozen=True, slots=True)
 class Closure:
-    """A later visit of a place, and how it is seen from the visit that made the place's view cell."""
+    """A loop closure: a keyframe at a known place, as seen from the keyframe that made the place's view cell."""
 
-    source: int
-    target: int
+    source: int  # vertex of the keyframe that made the view cell
+    target: int  # vertex of the keyframe that was recognised
     motion: tuple[float, float, float]  # along, across, heading of the target seen from the source
-    spacing: float  # view spacing at the time: what the standard deviations are relative to
-    margin: float
+    spacing: float  # way between keyframes at the time, map units: the standard deviations are relative to it
+    margin: float  # filtered margin of the recognition
 
 
 def odometry_edges(motions: FloatArray, config: ExperienceMapConfig) -> Edges:
-    """Edges between consecutive visits; ``motions`` (S, 3), row 0 belongs to no edge."""
+    """Edges between consecutive keyframes from their raw motions (S, 3); row 0 leads to the first keyframe and is no edge."""
     steps = motions[1:]
     count = len(steps)
     length = np.hypot(steps[:, 0], steps[:, 1])
@@ -70,7 +74,7 @@ def odometry_edges(motions: FloatArray, config: ExperienceMapConfig) -> Edges:
 
 
 def closure_edges(closures: list[Closure], config: ExperienceMapConfig) -> Edges:
-    """Edges across loop closures."""
+    """The loop closures as edges, with standard deviations in map units."""
     count = len(closures)
     relative = np.array([config.closure_along, config.closure_across])
     spacing = np.array([c.spacing for c in closures]).reshape(count, 1)
@@ -84,29 +88,35 @@ def closure_edges(closures: list[Closure], config: ExperienceMapConfig) -> Edges
     )
 
 
-def steadied(closures: list[Closure], motions: FloatArray, config: ExperienceMapConfig) -> list[Closure]:
-    """Closures in the order of their targets, each with the median along-track offset of its stretch.
+def with_median_offsets(closures: list[Closure], motions: FloatArray, config: ExperienceMapConfig) -> list[Closure]:
+    """The closures by target, each with the median along-track offset of those within ``steady_reach`` of it.
 
-    While two passes of a road run side by side, odometry says how their offset goes on: it does not change. A single view's
-    offset is a parabola through three scores; the median over some 30 m of way halves its error and mends the outliers.
+    While two passes of a road run side by side, the offset between the nth keyframe of one and of the other stays what it is, but
+    for odometry's error. A single view measures it by a parabola through three scores; the median over some 30 m halves that
+    error and takes out the outliers. Over longer ways the drift of the scale would outweigh what the median gains.
+
+    Args:
+        closures: in any order.
+        motions: raw motion to each keyframe from the one before, (S, 3).
+        config: gives ``steady_reach``.
     """
     ordered = sorted(closures, key=lambda c: (c.target, c.source))
     way = np.cumsum(np.hypot(motions[:, 0], motions[:, 1]))
-    at = np.array([way[c.target] for c in ordered])
-    lead = np.array([way[c.source] + c.motion[0] - way[c.target] for c in ordered])  # constant along a stretch
-    steady = []
+    target_way = np.array([way[c.target] for c in ordered])
+    offset = np.array([way[c.source] + c.motion[0] - way[c.target] for c in ordered])  # alike along one pass of a road
+    smoothed = []
     for i, closure in enumerate(ordered):
         reach = config.steady_reach * closure.spacing
-        first, last = np.searchsorted(at, [at[i] - reach, at[i] + reach], side="left")
-        leads = lead[first : last + 1]
-        same_stretch = leads[np.abs(leads - lead[i]) <= reach]
-        along = closure.motion[0] + float(np.median(same_stretch)) - float(lead[i])
-        steady.append(replace(closure, motion=(along, *closure.motion[1:])))
-    return steady
+        first, last = np.searchsorted(target_way, [target_way[i] - reach, target_way[i] + reach], side="left")
+        near = offset[first : last + 1]
+        same_pass = near[np.abs(near - offset[i]) <= reach]
+        along = closure.motion[0] + float(np.median(same_pass)) - float(offset[i])
+        smoothed.append(replace(closure, motion=(along, *closure.motion[1:])))
+    return smoothed
 
 
-def joined(a: Edges, b: Edges) -> Edges:
-    """Both sets of edges."""
+def concatenated(a: Edges, b: Edges) -> Edges:
+    """The edges of ``a``, then those of ``b``."""
     return Edges(
         source=np.concatenate([a.source, b.source]),
         target=np.concatenate([a.target, b.target]),
@@ -118,22 +128,36 @@ def joined(a: Edges, b: Edges) -> Edges:
 
 
 def relaxed_poses(motions: FloatArray, edges: Edges, config: ExperienceMapConfig) -> FloatArray:
-    """Poses (V, 3) of the vertices, the first at the origin; visit ``i`` is vertex ``i``."""
+    """Poses (V, 3) of the vertices that fit the edges, the first at the origin; the search begins at dead reckoning.
+
+    ``motions`` (V, 3) lead to each keyframe from the one before; row 0 is ignored.
+    """
     reckoned = se2.integrate(np.zeros(3), np.concatenate([np.zeros((1, 3)), motions[1:]])[: len(motions)])
     if config.relaxation == "robust":
-        return optimise(reckoned, edges, config.pose_graph)
+        return relax_pose_graph(reckoned, edges, config.pose_graph)
     return relax_ratslam(reckoned, edges, config.ratslam_correction, config.ratslam_sweeps)
 
 
 def relax_ratslam(poses: FloatArray, edges: Edges, correction: float, sweeps: int) -> FloatArray:
-    """RatSLAM's experience map correction: every link in turn moves both its ends by half of ``correction`` of its error."""
+    """RatSLAM's correction of the experience map (Milford and Wyeth 2008): in turn, every edge moves its two ends together.
+
+    Args:
+        poses: before the correction, (V, 3).
+        edges: whose errors are corrected.
+        correction: share of an edge's error that is corrected at once, half of it at either end.
+        sweeps: passes over all edges.
+
+    Returns:
+        Poses (V, 3), moved so that the first is at the origin again.
+    """
     relaxed: FloatArray = _relax(poses.copy(), edges.source, edges.target, edges.motion, 0.5 * correction, sweeps)
-    back_home: FloatArray = se2.between(relaxed[:1], relaxed)
-    return back_home
+    seen_from_first: FloatArray = se2.between(relaxed[:1], relaxed)
+    return seen_from_first
 
 
 @njit(cache=True)
 def _relax(poses: FloatArray, source: IntArray, target: IntArray, motion: FloatArray, share: float, sweeps: int) -> FloatArray:
+    """Sweeps over the edges in place: each moves its source by minus, its target by plus ``share`` of its error."""
     for _ in range(sweeps):
         for e in range(len(source)):
             a, b = source[e], target[e]

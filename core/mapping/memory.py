@@ -1,7 +1,12 @@
-"""Memory of places while mapping: stored views, the graph that joins them, and the recognition of a place seen before.
+"""Memory of places while mapping: is the place of a keyframe one seen before?
 
-A view waits before it is stored. In the meantime the views that follow may recognise their place, and then, walking back along
-the path that led there, its own: such a visit shares the old cell. Recent views are no candidates, so waiting costs nothing.
+Stored views are the nodes of a graph, whose links are the ways driven between them. A keyframe's view is scored against all
+stored ones and the scores are filtered along the graph (``views.sequence``). Where a place stands out far enough, the keyframe
+shares its view cell in place of storing its own view.
+
+A view is *pending* for some keyframes before it is stored. When a later keyframe recognises its place, the path of best evidence
+that led there tells the places of the pending keyframes before it, too. As places driven by a moment ago are no candidates for a
+loop closure anyway, nothing is lost by the delay.
 """
 
 from __future__ import annotations
@@ -12,10 +17,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from hippodrome.core.mapping.view_store import ViewStore
 from hippodrome.core.types import Float32Array, ViewCells
-from hippodrome.core.views import descriptors as view_cells
-from hippodrome.core.views.descriptors import Descriptor, ViewCellBank, ViewCellConfig
+from hippodrome.core.views.descriptors import Descriptor, ViewCellConfig
 from hippodrome.core.views.graph import CellGraph
+from hippodrome.core.views.peaks import peak_of_values, peak_shift
+from hippodrome.core.views.scoring import score, start_query_mean, update_query_mean
 from hippodrome.core.views.sequence import (
     NO_EVIDENCE,
     Evidence,
@@ -29,16 +36,16 @@ from hippodrome.core.views.sequence import (
 
 @dataclass(frozen=True)
 class PlaceMemoryConfig:
-    """When a view counts as a place seen before."""
+    """When a view counts as one of a place seen before."""
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
     view_cells: ViewCellConfig = field(default_factory=ViewCellConfig)
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
-    start_margin: float = 4.0  # filtered, on meeting an old road: bends look alike, and a wrong closure breeds more of them
-    closure_margin: float = 2.0  # filtered, once on it
-    waiting_views: int = 16  # before a view is stored: the loop around the smallest block is longer
-    support_z: float = 3.0  # what the view itself must say: the filter runs on past a junction, and back before one
+    start_margin: float = 4.0  # least filtered margin on meeting an old road; strict, as a wrong closure breeds more of them
+    closure_margin: float = 2.0  # least filtered margin once on an old road
+    waiting_views: int = 16  # views that are pending before they are stored; the loop around the smallest block is longer
+    support_z: float = 3.0  # least z-score of the view itself: the filter alone would run on past a junction, or back before one
     column_rad: float = 0.1  # heading per column of shift, between the mean (fov / columns) and the centre of a 90 deg image
 
     def __post_init__(self) -> None:
@@ -50,41 +57,41 @@ class PlaceMemoryConfig:
 
 @dataclass(frozen=True, slots=True)
 class Recognition:
-    """A visit's place is one seen before."""
+    """The place of a keyframe is one seen before."""
 
-    vertex: int  # the visit
-    cell: int
-    margin: float  # of the view that settled it
-    along: float  # where the visit is, seen from the place where the cell was made; map units
-    heading_rad: float
+    vertex: int  # the keyframe's vertex
+    cell: int  # view cell of the place
+    margin: float  # filtered margin of the view that triggered this recognition
+    along: float  # map units that the keyframe lies ahead of the vertex that made the cell
+    heading_rad: float  # heading of the keyframe, seen from that vertex
 
 
 @dataclass(slots=True, eq=False)
-class _Waiting:
-    """A view that is not stored yet."""
+class _PendingView:
+    """The view of a keyframe that is not stored yet, and all that a recognition in retrospect needs."""
 
     vertex: int
     descriptor: Descriptor
-    travelled: float
-    turned_rad: float
-    scores: Float32Array  # (C, shifts) against the cells of its time
+    travelled: float  # since the keyframe before, map units
+    turned_rad: float  # since the keyframe before
+    scores: Float32Array  # (C, shifts) against the cells stored at that time
     evidence: Evidence
-    cell: int = -1  # recognised
+    cell: int = -1  # the cell that the view was recognised as; -1: none, so that it will get one of its own
 
 
 class PlaceMemory:
-    """Cells, their graph and the running evidence; ``recognise`` one view after the other."""
+    """View cells, the graph that joins them, and the running evidence: ``recognise`` one keyframe after the other."""
 
     def __init__(self, config: PlaceMemoryConfig) -> None:
         size = int(np.prod(config.view_cells.shape))
         self._config = config
         self._graph = CellGraph()
-        self._views = _ViewStore(config.view_cells)
-        self._query_mean = view_cells.start_query_mean(np.zeros(size, dtype=np.float32))
-        self._waiting: deque[_Waiting] = deque()
-        self._last_cell = -1
-        self.vertex_cell: list[int] = []  # (V,) of the visits stored so far
-        self.cell_vertex: list[int] = []  # (C,) the visit that made each cell
+        self._views = ViewStore(config.view_cells)
+        self._query_mean = start_query_mean(np.zeros(size, dtype=np.float32))
+        self._pending: deque[_PendingView] = deque()
+        self._last_cell = -1  # cell of the keyframe stored last
+        self.vertex_cell: list[int] = []  # (V,) the cell of each vertex stored so far
+        self.cell_vertex: list[int] = []  # (C,) the vertex that made each cell
 
     @property
     def can_recognise(self) -> bool:
@@ -94,39 +101,57 @@ class PlaceMemory:
     def recognise(
         self, vertex: int, descriptor: Descriptor, travelled: float, turned_rad: float, spacing: float
     ) -> list[Recognition]:
-        """The visit's own recognition last, after those of earlier visits that it settles; empty: new, or not sure yet."""
-        sequence = self._config.sequence
-        self._query_mean = view_cells.update_query_mean(self._query_mean, descriptor, self._config.view_cells)
-        scores = view_cells.score(self._views.bank, descriptor, self._query_mean, self._config.view_cells)
-        floor = sequence.sigma_floor if self._config.view_cells.kind == "gradient" else sequence.grey_sigma_floor
-        z = standardise(scores.max(axis=1), sequence.min_cells, floor)
-        before = self._waiting[-1].evidence if self._waiting else NO_EVIDENCE
-        evidence = filter_step(before, z, self._graph.links, travelled, turned_rad, spacing, sequence)
-        self._waiting.append(_Waiting(vertex, descriptor, travelled, turned_rad, scores, evidence))
-        best = peak(evidence, self._graph.links, sequence.neighbourhood * spacing)
-        found = self._trace(best) if best.margin >= self._needed_margin(best) else []
-        if len(self._waiting) > self._config.waiting_views:
-            self._store(spacing)
+        """What places the view of a new keyframe recognises; the keyframe's view is then pending.
+
+        Args:
+            vertex: number of the keyframe's vertex; numbers count up.
+            descriptor: the keyframe's view, (D,).
+            travelled: way since the keyframe before, map units.
+            turned_rad: turn since the keyframe before.
+            spacing: present way between two keyframes, map units.
+
+        Returns:
+            The recognitions that this view triggers, in the order of the vertices: pending keyframes on the path that led here,
+            and last this keyframe itself. Empty where its place is new, or not certain yet.
+        """
+        self._query_mean = update_query_mean(self._query_mean, descriptor, self._config.view_cells)
+        scores = score(self._views.bank, descriptor, self._query_mean, self._config.view_cells)
+        evidence = self._filtered_evidence(scores, travelled, turned_rad, spacing)
+        self._pending.append(_PendingView(vertex, descriptor, travelled, turned_rad, scores, evidence))
+        best = peak(evidence, self._graph.links, self._config.sequence.neighbourhood * spacing)
+        found = self._trace_back(best) if best.margin >= self._needed_margin(best) else []
+        if len(self._pending) > self._config.waiting_views:
+            self._store_oldest(spacing)
         return found
 
     def finish(self, spacing: float) -> ViewCells:
-        """Store what still waits; the cells of the finished map."""
-        while self._waiting:
-            self._store(spacing)
-        config, templates = self._config.view_cells, self._views.bank.templates
-        return ViewCells(config.kind, templates.copy(), view_cells.template_mean(config.kind, templates), config.shape)
+        """Store what is still pending; the view cells of the finished map."""
+        while self._pending:
+            self._store_oldest(spacing)
+        return self._views.finished()
+
+    def _filtered_evidence(self, scores: Float32Array, travelled: float, turned_rad: float, spacing: float) -> Evidence:
+        """The scores (C, shifts) of a view as z-scores, filtered along the graph with the evidence of the view before."""
+        sequence = self._config.sequence
+        floor = sequence.sigma_floor if self._config.view_cells.kind == "gradient" else sequence.grey_sigma_floor
+        z = standardise(scores.max(axis=1), sequence.min_cells, floor)
+        before = self._pending[-1].evidence if self._pending else NO_EVIDENCE
+        return filter_step(before, z, self._graph.links, travelled, turned_rad, spacing, sequence)
 
     def _needed_margin(self, best: Peak) -> float:
-        """Less on a road that the views before have recognised, where the path leads from their cell to this one."""
-        latest = self._waiting[-1]
+        """The margin that the best cell needs: less where the keyframe before was recognised and its cell leads to this one."""
+        latest = self._pending[-1]
         came_from = latest.evidence.predecessor[best.cell] if best.cell >= 0 else -1
-        continues = came_from >= 0 and len(self._waiting) > 1 and self._waiting[-2].cell == came_from
+        continues = came_from >= 0 and len(self._pending) > 1 and self._pending[-2].cell == came_from
         return self._config.closure_margin if continues else self._config.start_margin
 
-    def _trace(self, best: Peak) -> list[Recognition]:
-        """The latest view's recognition, and those of waiting views on the path that led to it."""
+    def _trace_back(self, best: Peak) -> list[Recognition]:
+        """Recognise the latest view as the best cell, and the pending views before it as the cells on the path that led there.
+
+        The path ends at a view that was recognised before, or whose own z-score does not support the cell.
+        """
         found, cell = [], best.cell
-        for view in reversed(self._waiting):
+        for view in reversed(self._pending):
             known = 0 <= cell < len(view.evidence.z_score) and view.cell < 0
             if not known or view.evidence.z_score[cell] < self._config.support_z:
                 break
@@ -135,13 +160,17 @@ class PlaceMemory:
             cell = int(view.evidence.predecessor[cell])
         return found[::-1]
 
-    def _recognition(self, view: _Waiting, margin: float) -> Recognition:
-        shift = _peak_offset(view.scores[view.cell])
+    def _recognition(self, view: _PendingView, margin: float) -> Recognition:
+        """The recognition of a view as its cell; a view that looks further right than the cell has its heading to the right."""
+        shift = peak_shift(view.scores[view.cell])
         along = self._along(view)
         return Recognition(view.vertex, view.cell, margin, along, -shift * self._config.column_rad)
 
-    def _along(self, view: _Waiting) -> float:
-        """Offset along the track: the parabola through the scores of the cell, the one before and the one after."""
+    def _along(self, view: _PendingView) -> float:
+        """Map units that a view lies ahead of its cell: where the parabola through the scores of three cells in a row peaks.
+
+        The three are the cell, the one before it and the one after it on the road; 0 where one of them is missing.
+        """
         links, best = self._graph.links, view.scores.max(axis=1)
         into, out_of = int(links.last_in[view.cell]), int(links.last_out[view.cell])
         if into < 0 or out_of < 0:
@@ -150,10 +179,11 @@ class PlaceMemory:
         before, after = int(links.source[into]), int(links.target[out_of])
         if max(before, after) >= len(best) or min(-behind, ahead) <= 0.0:
             return 0.0
-        return _parabola(behind, best[before], best[view.cell], ahead, best[after])
+        return peak_of_values(behind, best[before], best[view.cell], ahead, best[after])
 
-    def _store(self, spacing: float) -> None:
-        view = self._waiting.popleft()
+    def _store_oldest(self, spacing: float) -> None:
+        """Store the oldest pending view, as a cell of its own unless it was recognised, and link its cell to the one before."""
+        view = self._pending.popleft()
         cell, tolerance = view.cell, self._config.sequence.length_tolerance * spacing
         if cell < 0:
             cell = self._graph.add_cell()
@@ -164,46 +194,3 @@ class PlaceMemory:
             self._graph.link(last, cell, view.travelled, view.turned_rad)
         self.vertex_cell.append(cell)
         self._last_cell = cell
-
-
-class _ViewStore:
-    """Stored templates in one growing block; the common mean is renewed whenever their number has grown by a quarter."""
-
-    def __init__(self, config: ViewCellConfig) -> None:
-        dtype: type[np.integer[Any]] = np.int8 if config.kind == "gradient" else np.uint8
-        self._config, self._count, self._renew_at = config, 0, 1
-        self._templates = np.zeros((64, int(np.prod(config.shape))), dtype=dtype)
-        nothing = np.zeros(self._templates.shape[1], dtype=np.float32)
-        self.bank = view_cells.make_bank(config.kind, config.shape, self._templates[:0], nothing)
-
-    def append(self, descriptor: Descriptor) -> None:
-        if self._count == len(self._templates):
-            self._templates = np.concatenate([self._templates, np.zeros_like(self._templates)])
-        self._templates[self._count] = descriptor
-        self._count += 1
-        stored, kind, shape = self._templates[: self._count], self._config.kind, self._config.shape
-        if self._count >= self._renew_at:
-            self._renew_at = self._count + max(1, self._count // 4)
-            self.bank = view_cells.make_bank(kind, shape, stored, view_cells.template_mean(kind, stored))
-            return
-        newest = view_cells.make_bank(kind, shape, stored[-1:], self.bank.mean)
-        inverse_norm = np.concatenate([self.bank.inverse_norm, newest.inverse_norm])
-        self.bank = ViewCellBank(kind, shape, stored, self.bank.mean, inverse_norm)
-
-
-def _parabola(x_before: float, before: float, here: float, x_after: float, after: float) -> float:
-    """Where the parabola through (x_before, before), (0, here), (x_after, after) peaks, at most half way to a neighbour."""
-    slope_before, slope_after = (here - before) / -x_before, (after - here) / x_after
-    curvature = (slope_after - slope_before) / (x_after - x_before)
-    if curvature >= 0.0:
-        return 0.0
-    tangent = slope_before + curvature * -x_before  # slope at 0 of the interpolating parabola
-    return float(np.clip(-0.5 * tangent / curvature, 0.5 * x_before, 0.5 * x_after))
-
-
-def _peak_offset(scores: Float32Array) -> float:
-    """Sub-column shift (columns) at which the scores (2 n + 1,) of one cell peak."""
-    best, centre = int(np.argmax(scores)), len(scores) // 2
-    if best in (0, len(scores) - 1):
-        return float(best - centre)
-    return best - centre + _parabola(-1.0, float(scores[best - 1]), float(scores[best]), 1.0, float(scores[best + 1]))

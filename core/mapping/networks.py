@@ -1,7 +1,9 @@
-"""The attractor networks while mapping: a parallel state beside the experience map, recorded at every vertex.
+"""The attractor networks while mapping: they run beside the experience map, and their state is recorded at every vertex.
 
-They begin once the memory could recognise a place: before that nothing can be injected and path integration alone is exact, so
-the earlier vertices' states follow from dead reckoning; and by then the typical step, which the tori's periods need, is known.
+They do not bend the map: its edges hold raw odometry, as the read-out of a network jumps with every injection.
+
+They start once the memory could recognise a place. Until then nothing can be injected, so that the states at earlier vertices
+follow from dead reckoning; and by then the typical way between keyframes is known, from which the tori get their periods.
 """
 
 from __future__ import annotations
@@ -20,14 +22,14 @@ from hippodrome.core.types import AttractorStates, FloatArray
 
 @dataclass(frozen=True)
 class MapperAttractorConfig:
-    """Networks of the mapper and how strongly a recognised place speaks to them."""
+    """The mapper's networks, and how strongly a recognised place speaks to them."""
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
     head: AttractorConfig = field(default_factory=AttractorConfig)
     grid: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=GRID_INFORMATION))
-    injection_share: float = 0.1  # of the total information E, per recognised view
-    period_spacings: float = 20.0  # smallest torus period in view spacings: about 100 m at 5 m
+    injection_share: float = 0.1  # reliability that a recognised view injects, as a share of the information E
+    period_spacings: float = 20.0  # smallest period of the tori, in distances between two keyframes: about 100 m at 5 m
 
     def __post_init__(self) -> None:
         if not 0.0 < self.injection_share <= 1.0 or self.period_spacings <= 0.0:
@@ -36,29 +38,29 @@ class MapperAttractorConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NeuralPose:
-    """State of the networks; ``position`` (2 populations, 2 axes) unwraps the tori."""
+    """State of both networks, and the position that tells which of its periods each torus is in."""
 
     head: HeadDirectionState
     grid: GridState
-    position: FloatArray
+    position: FloatArray  # (2 populations, 2 axes) map units, unwrapped
 
     @property
     def pose(self) -> FloatArray:
-        """Read-out (3,) of Eqs. (15)-(16), Li et al. 2025, in map units and rad."""
+        """The pose (3,) that the networks encode, Eqs. (15)-(16), Li et al. 2025, in map units and rad."""
         heading_rad, _ = head_direction.read_out(self.head)
         position, _ = grid_cells.read_out(self.grid, self.position[0])
         return np.array([position[0], position[1], heading_rad])
 
 
 def begin(pose: FloatArray, spacing: float, config: MapperAttractorConfig) -> NeuralPose:
-    """Networks that know where they are, (3,): the integrators hold E, the calibration cells their share of it."""
+    """Networks that know their pose (3,); ``spacing`` is the typical way between keyframes, map units."""
     period = grid_cells.module_periods(config.period_spacings * spacing)
     head = head_direction.known(float(pose[2]), config.head)
     return NeuralPose(head, grid_cells.known(pose[:2], period, config.grid), np.tile(pose[:2], (2, 1)))
 
 
 def path_integrate(state: NeuralPose, motion: FloatArray, dt_s: float, config: MapperAttractorConfig) -> NeuralPose:
-    """One body motion (3,) into both networks, then mutual and global inhibition, Eqs. (3)-(7), Li et al. 2025."""
+    """Path integration of one body motion (3,), then inhibition, Eqs. (3)-(7), Li et al. 2025, in both networks."""
     step = _rotated(state.head.mean_rad, motion[:2])
     head = head_direction.integrate(state.head, float(motion[2]) / dt_s, dt_s)
     grid = grid_cells.integrate(state.grid, step, np.zeros((2, 2)))
@@ -70,17 +72,17 @@ def path_integrate(state: NeuralPose, motion: FloatArray, dt_s: float, config: M
 
 
 def inject(state: NeuralPose, pose: FloatArray, config: MapperAttractorConfig) -> NeuralPose:
-    """A recognised view cell speaks for the pose (3,) at which it was made, Eqs. (13)-(14), Li et al. 2025."""
+    """A recognised view cell speaks for a pose (3,): Eqs. (13)-(14), Li et al. 2025, in both networks."""
     head = head_direction.inject(state.head, float(pose[2]), config.injection_share * config.head.information, config.head)
     per_length = 2.0 * np.pi / state.grid.period[0]
     strength = np.full(2, config.injection_share * config.grid.information * per_length**2)
     grid = grid_cells.inject(state.grid, pose[:2], strength, config.grid)
     injected = NeuralPose(head, grid, state.position)
-    return NeuralPose(head, grid, np.tile(injected.pose[:2], (2, 1)))
+    return NeuralPose(head, grid, np.tile(injected.pose[:2], (2, 1)))  # both populations are unwrapped from the new read-out on
 
 
 def recorded(states: list[NeuralPose]) -> AttractorStates:
-    """The networks at V vertices."""
+    """The states of the networks at V vertices as the map stores them."""
     count = len(states)
     modules = len(states[0].grid.period) if states else 0
     return AttractorStates(
@@ -93,10 +95,11 @@ def recorded(states: list[NeuralPose]) -> AttractorStates:
 
 
 def _rotated(heading_rad: FloatArray, motion: FloatArray) -> FloatArray:
-    """A body displacement (2,) along each population's heading (2,): (2 populations, 2 axes)."""
+    """A body displacement (2,) turned by each population's heading (2,): (2 populations, 2 axes)."""
     cos, sin = np.cos(heading_rad), np.sin(heading_rad)
     return np.stack([cos * motion[0] - sin * motion[1], sin * motion[0] + cos * motion[1]], axis=-1)
 
 
 def _stacked(rows: list[FloatArray], shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.float32]]:
+    """The rows as one array of the given shape, which an empty list does not tell."""
     return np.array(rows, dtype=np.float32).reshape(shape)

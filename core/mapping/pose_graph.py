@@ -1,7 +1,8 @@
-"""Robust pose-graph optimisation: odometry is trusted, closures must earn it.
+"""Robust pose-graph optimisation: odometry is trusted, loop closures have to prove themselves.
 
-Graduated non-convexity with the Geman-McClure loss: first every closure pulls like a spring, then those that disagree with the
-rest lose their weight. One false closure in a hundred destroys plain least squares.
+One false closure in a hundred destroys plain least squares. The remedy is graduated non-convexity with the Geman-McClure loss
+(Yang et al. 2020, "Graduated Non-Convexity for Robust Spatial Perception"): at first the loss is so wide that every closure pulls
+as in least squares; then it narrows round by round, and closures that disagree with all the rest lose their weight.
 """
 
 from __future__ import annotations
@@ -15,61 +16,67 @@ from scipy.sparse import csr_array
 from hippodrome.core import se2
 from hippodrome.core.solvers.gauss_newton import factorise
 from hippodrome.core.solvers.pose_costs import local_residual
+from hippodrome.core.solvers.robust import geman_mcclure_weight
 from hippodrome.core.types import EdgeKind, Edges, FloatArray
 
 
 @dataclass(frozen=True)
 class PoseGraphConfig:
-    """The robust loss and when to stop."""
+    """The robust loss of the closures, and when to stop."""
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
-    robust_scale: float = 3.0  # sigmas at which a closure's weight has fallen to a quarter
-    rounds: int = 15  # of re-weighting, one Gauss-Newton step each
-    anneal: float = 4.0  # the loss narrows by this factor a round
+    robust_scale: float = 3.0  # error of a closure in sigmas at which its weight has fallen to a quarter
+    rounds: int = 15  # rounds of re-weighting the closures, each with one Gauss-Newton step
+    anneal: float = 4.0  # factor by which the squared width of the loss shrinks in each round, down to robust_scale
 
     def __post_init__(self) -> None:
         if self.robust_scale <= 0.0 or self.rounds < 1 or self.anneal <= 1.0:
             raise ValueError("pose graph: robust_scale > 0, rounds >= 1 and anneal > 1 are required")
 
 
-def optimise(poses: FloatArray, edges: Edges, config: PoseGraphConfig) -> FloatArray:
-    """Poses (V, 3) that fit the edges best, the first one held. ``poses`` is where the search begins (dead reckoning)."""
+def relax_pose_graph(poses: FloatArray, edges: Edges, config: PoseGraphConfig) -> FloatArray:
+    """Poses (V, 3) that fit the edges best, with robust weights for closures; the first pose is held.
+
+    Args:
+        poses: where the search begins, (V, 3); dead reckoning will do.
+        edges: odometry and closures.
+        config: of the robust loss.
+    """
     if len(edges.source) == 0:
         return poses.copy()
-    weight = np.ones(len(edges.source))
-    robust = edges.kind == EdgeKind.CLOSURE
+    sq_width = config.robust_scale**2
     widening = _first_widening(poses, edges, config)
-    for _ in range(config.rounds if robust.any() else 1):
-        weight = np.where(robust, _geman_mcclure(_sq_error(poses, edges), config.robust_scale**2 * widening), 1.0)
-        poses = _step(poses, edges, weight)
+    for _ in range(config.rounds if np.any(edges.kind == EdgeKind.CLOSURE) else 1):
+        poses = _gauss_newton_step(poses, edges, edge_weights(poses, edges, sq_width * widening))
         widening = max(1.0, widening / config.anneal)
     return np.concatenate([poses[:, :2], se2.wrap(poses[:, 2:])], axis=1)
 
 
-def closure_weights(poses: FloatArray, edges: Edges, config: PoseGraphConfig) -> FloatArray:
-    """Weight (E,) in [0, 1] that each edge has at ``poses``; 1 for odometry."""
-    weight: FloatArray = _geman_mcclure(_sq_error(poses, edges), config.robust_scale**2)
+def edge_weights(poses: FloatArray, edges: Edges, sq_width: float) -> FloatArray:
+    """Weight (E,) of each edge at ``poses``: Geman-McClure with a squared width in sigmas for closures, 1 for odometry."""
+    weight = geman_mcclure_weight(_sq_error(poses, edges), sq_width)
     return np.where(edges.kind == EdgeKind.CLOSURE, weight, 1.0)
 
 
 def _first_widening(poses: FloatArray, edges: Edges, config: PoseGraphConfig) -> float:
-    """Widening of the loss at which all residuals still lie on its convex part (Yang et al. 2020)."""
+    """Factor on the squared width at which all errors still lie on the loss's convex part (Yang et al. 2020), within limits.
+
+    At most as wide as the rounds can narrow, so that the last ones run at ``robust_scale`` itself.
+    """
     worst = float(_sq_error(poses, edges).max())
     return min(max(1.0, 3.0 * worst / config.robust_scale**2), config.anneal ** (config.rounds - 3))
 
 
-def _geman_mcclure(sq_error: FloatArray, sq_scale: float) -> FloatArray:
-    return (sq_scale / (sq_error + sq_scale)) ** 2
-
-
 def _sq_error(poses: FloatArray, edges: Edges) -> FloatArray:
+    """Squared error of each edge in sigmas, (E,): the squared norm of Eq. (11), Li et al. 2025."""
     residual, _ = local_residual(poses, edges.source, edges.target, edges.motion, edges.sigma)
     squared: FloatArray = np.sum(residual.reshape(-1, 3) ** 2, axis=1)
     return squared
 
 
-def _step(poses: FloatArray, edges: Edges, weight: FloatArray) -> FloatArray:
+def _gauss_newton_step(poses: FloatArray, edges: Edges, weight: FloatArray) -> FloatArray:
+    """Poses after one Gauss-Newton step on the weighted squares of Eq. (11), Li et al. 2025; the first pose is no unknown."""
     sigma = edges.sigma / np.sqrt(np.maximum(weight, 1e-12))[:, None]
     residual, jacobian = local_residual(poses, edges.source, edges.target, edges.motion, sigma)
     free = csr_array(jacobian[:, 3:])

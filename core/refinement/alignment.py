@@ -1,9 +1,13 @@
 """Where a semi-metric map lies on the road network: one similarity (scale, rotation, translation) from the start pose alone.
 
-Section III.B of Li et al. 2025 measures vertices against roads in metres and does not say how the map came by them. Here: every
-scale between wide limits and every rotation near the start heading is a hypothesis, held at the start pose. The hypotheses are
-scored on a prefix of the drive, improved there by trimmed iterative closest points (ICP), and thinned while the prefix doubles
-up to the whole map. A short prefix cannot tell scales apart (a straight road fits at any), so early rounds keep many.
+Section III.B of Li et al. 2025 measures vertices against roads in metres and does not say how the map came by metres. Here every
+scale between wide limits, with every rotation near the start heading, is a hypothesis, held at the start pose. The hypotheses are
+scored on a prefix of the drive, improved there by trimmed iterative closest points (ICP; Chetverikov et al. 2005), and thinned,
+while the prefix doubles up to the whole map. A short prefix cannot tell scales apart (a straight road fits at any scale), so that
+the early rounds keep many.
+
+A hypothesis is a row (a, b, x, y) with a = s cos(r) and b = s sin(r), s being metres per map unit and r the rotation: a point
+(u, v) of the map then lies at (a u - b v + x, b u + a v + y), which is linear in the hypothesis.
 """
 
 from __future__ import annotations
@@ -18,67 +22,74 @@ from hippodrome.core import se2
 from hippodrome.core.roads.geometry import RoadGeometry, poses_on_segments
 from hippodrome.core.types import FloatArray, IntArray, StartPose
 
-_ROAD_SPACING_M = 2.0  # of the road samples: small against the truncation
-_STEP_SHARE = 0.05  # of the scale, and ...
-_STEP_M = 30.0  # ... of translation: how far one ICP step goes along what the roads leave open
-_OTHER_SCALE = 0.03  # ratio and ...
-_OTHER_TURN_RAD = 0.05  # ... angle from which an alignment counts as another one
+_ROAD_SPACING_M = 2.0  # spacing of the road samples: small against the truncation
+_STEP_SHARE = 0.05  # prior sigma of an ICP step in a and b, as a share of the scale: how far it goes along what roads leave open
+_STEP_M = 30.0  # the same in translation
+_OTHER_SCALE = 0.03  # relative difference in scale from which an alignment counts as another one
+_OTHER_TURN_RAD = 0.05  # difference in rotation from which it does
 
 
 @dataclass(frozen=True, slots=True)
 class AlignmentConfig:
-    """How the similarity between map and network is sought."""
+    """How the similarity between map and network is searched for."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    min_scale_m: float = 0.2  # metres per map unit: monocular maps are off by a factor, not by orders of magnitude
+    min_scale_m: float = 0.2  # metres per map unit, lower end: monocular maps are off by a factor, not by orders of magnitude
     max_scale_m: float = 5.0
-    scale_step: float = 0.04  # ratio: 2 % error at 300 m from the start is 6 m, inside the reach of ICP
-    max_turn_rad: float = 0.6  # of the whole map against its first vertex, by heading drift and a wrong start heading
+    scale_step: float = 0.04  # relative step between the scales tried: 2 % are 6 m at 300 m from the start, within reach of ICP
+    max_turn_rad: float = 0.6  # largest rotation tried against the start heading: heading drift, and a wrong start heading
     turn_step_rad: float = 0.06
-    first_prefix: int = 200  # vertices: about 1 km, some turns in every town
-    kept: tuple[int, ...] = (160, 60, 24, 12)  # hypotheses that survive each round; the last number holds from there on
-    truncation_m: float = 30.0  # a vertex farther than this from any fitting road says no more than one at this distance
-    heading_lever_m: float = 25.0  # metres that a heading error of 1 rad counts as
-    max_misfit: float = 0.75  # mean truncated distance over the truncation; maps laid out at random reach 0.6-0.7
-    trimmed_share: float = 0.85  # of the vertices drives each ICP step: the rest may lie on roads that the network lacks
+    first_prefix: int = 200  # vertices that hypotheses are first scored on: about 1 km, with some turns in every town
+    kept: tuple[int, ...] = (160, 60, 24, 12)  # hypotheses kept in each round; the last number holds for all later rounds
+    truncation_m: float = 30.0  # a vertex farther than this from any fitting road counts as if it were at this distance
+    heading_lever_m: float = 25.0  # metres that a heading error of 1 rad counts as in the distance from a road
+    max_misfit: float = 0.75  # largest mean distance, as a share of truncation_m; maps laid out at random reach 0.6-0.7
+    trimmed_share: float = 0.85  # share of the vertices that an ICP step uses: the rest may lie on roads that the network lacks
     icp_steps: int = 6
-    road_sigma_m: float = 5.0  # distance of a well aligned vertex from its road
-    bend_sigma_m: float = 10.0  # distance of the first vertex from its place under the best similarity of a bent map
-    scored_vertices: int = 150  # evenly spaced; enough to rank hypotheses
+    road_sigma_m: float = 5.0  # sigma of a well aligned vertex's distance from its road
+    bend_sigma_m: float = 10.0  # sigma of the first vertex's distance from the start pose: the best similarity of a bent map
+    scored_vertices: int = 150  # evenly spaced vertices of the prefix that are used: enough to rank hypotheses
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Similarity:
-    """``p -> scale_m R(rotation) p + translation``."""
+    """The map's points p in the network's frame: ``scale_m R(rotation_rad) p + translation_m``."""
 
     scale_m: float  # metres per map unit
     rotation_rad: float
     translation_m: FloatArray  # (2,)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
     """The best similarity, its cost, and the cost of the best one that differs from it."""
 
     similarity: Similarity
-    cost: float  # mean truncated distance over the truncation, 0 (perfect) to 1
-    runner_up_cost: float  # of the best hypothesis with another scale or rotation, 1 where none is left
+    cost: float  # as of ``_costs``; 0 is perfect
+    runner_up_cost: float  # cost of the best hypothesis with another scale or rotation; 1 where none is left
 
 
 def apply(similarity: Similarity, poses: FloatArray) -> FloatArray:
-    """Poses (N, 3) of the map in the network frame, metres."""
+    """Poses (N, 3) of the map in the network's frame, metres."""
     cos, sin = np.cos(similarity.rotation_rad), np.sin(similarity.rotation_rad)
     xy = similarity.scale_m * poses[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + similarity.translation_m
     return np.column_stack([xy, se2.wrap(poses[:, 2] + similarity.rotation_rad)])
 
 
 def align(poses: FloatArray, start: StartPose, geometry: RoadGeometry, config: AlignmentConfig) -> Alignment:
-    """Similarity that lays the map's poses (V, 3) on the roads, given the first vertex's pose."""
+    """The similarity that lays a map on the roads.
+
+    Args:
+        poses: of the map's vertices, (V, 3) in map units.
+        start: pose of the first vertex in the network's frame, about.
+        geometry: of the roads.
+        config: of the search.
+    """
     roads = _sampled_roads(geometry, config.heading_lever_m)
     hypotheses = _scan(start, poses[0], config)
     prefix = min(config.first_prefix, len(poses))
-    for round_ in range(len(poses)):  # ends long before: the prefix doubles
+    for round_ in range(len(poses)):  # as the prefix doubles, it ends after a few rounds
         sample = poses[np.unique(np.linspace(0, prefix - 1, config.scored_vertices).astype(int))]
         costs = _costs(hypotheses, sample, roads, config)
         hypotheses = hypotheses[np.argsort(costs, kind="stable")[: config.kept[min(round_, len(config.kept) - 1)]]]
@@ -92,7 +103,7 @@ def align(poses: FloatArray, start: StartPose, geometry: RoadGeometry, config: A
 
 
 def _scan(start: StartPose, first: FloatArray, config: AlignmentConfig) -> FloatArray:
-    """Hypotheses (H, 4): s cos, s sin, translation; every scale with every rotation, the first vertex at the start pose."""
+    """The first hypotheses (H, 4): every scale with every rotation, each with the first vertex (3,) at the start pose."""
     steps = int(np.ceil(np.log(config.max_scale_m / config.min_scale_m) / np.log1p(config.scale_step)))
     scales = np.geomspace(config.min_scale_m, config.max_scale_m, steps + 1)
     turns = int(np.ceil(config.max_turn_rad / config.turn_step_rad))
@@ -103,14 +114,17 @@ def _scan(start: StartPose, first: FloatArray, config: AlignmentConfig) -> Float
 
 
 def _moved(hypotheses: FloatArray, poses: FloatArray) -> FloatArray:
-    """Poses (H, N, 3) under each hypothesis."""
+    """Poses (N, 3) of the map in the network's frame under each hypothesis, (H, N, 3)."""
     a, b, tx, ty = (column[:, None] for column in hypotheses.T)
     x, y = a * poses[:, 0] - b * poses[:, 1] + tx, b * poses[:, 0] + a * poses[:, 1] + ty
     return np.stack([x, y, poses[:, 2] + np.arctan2(b, a)], axis=-1)
 
 
 def _nearest(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: AlignmentConfig) -> tuple[FloatArray, IntArray]:
-    """Distance (H, N) in position and heading to the nearest road sample, and that sample; infinite beyond the truncation."""
+    """Distance (H, N) of each pose in position and heading to the nearest road sample, and the sample's number.
+
+    Beyond the truncation the distance is infinite, and the number that of no sample.
+    """
     lifted = _lifted(_moved(hypotheses, poses), config.heading_lever_m)
     distance, sample = roads.tree.query(lifted, distance_upper_bound=config.truncation_m)
     shape = (len(hypotheses), len(poses))
@@ -118,10 +132,11 @@ def _nearest(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: A
 
 
 def _costs(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: AlignmentConfig) -> FloatArray:
-    """Mean truncated distance (H,) over the truncation and the root of the scale; infinite outside the limits.
+    """Cost (H,) of each hypothesis: mean truncated distance over the truncation, over the root of the scale.
 
-    In metres of the network a map shrunk into a junction fits best, in units of the map one blown up does. The root of the scale
-    measures half-way between both frames, where neither pays.
+    Measured in metres of the network, a map shrunk into one junction would fit best; measured in units of the map, one blown up
+    would. Division by the root of the scale is half-way between both frames, where neither pays. Infinite for hypotheses outside
+    the limits of scale or misfit.
     """
     distance, _ = _nearest(hypotheses, poses, roads, config)
     scale = np.hypot(hypotheses[:, 0], hypotheses[:, 1])
@@ -133,7 +148,11 @@ def _costs(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: Ali
 def _icp_step(
     hypotheses: FloatArray, poses: FloatArray, first: FloatArray, start: StartPose, roads: _Roads, config: AlignmentConfig
 ) -> FloatArray:
-    """One trimmed point-to-line step of every hypothesis: linear in (s cos, s sin, translation)."""
+    """Every hypothesis (H, 4) after one trimmed point-to-line step of ICP: a linear least squares problem in (a, b, x, y).
+
+    Its terms: the distance of every used pose from the line of its nearest road sample (``road_sigma_m``), of the first vertex
+    from the start pose, and of the new hypothesis from the old, so that it does not run away along what the roads leave open.
+    """
     distance, sample = _nearest(hypotheses, poses, roads, config)
     trim = np.quantile(distance, config.trimmed_share, axis=1, method="higher")
     used = np.isfinite(distance) & (distance <= trim[:, None])
@@ -144,21 +163,21 @@ def _icp_step(
     right = np.einsum("hni,hn->hi", rows, offset * used) / config.road_sigma_m**2
     held = _rows(np.eye(2), first[0], first[1]) / np.hypot(start.sigma_m, config.bend_sigma_m)
     target = np.array([start.x_m, start.y_m]) / np.hypot(start.sigma_m, config.bend_sigma_m)
-    stay = np.stack([_STEP_SHARE * np.hypot(hypotheses[:, 0], hypotheses[:, 1])] * 2 + [np.full(len(hypotheses), _STEP_M)] * 2)
-    prior = stay.T**-2.0
+    sigma = np.stack([_STEP_SHARE * np.hypot(hypotheses[:, 0], hypotheses[:, 1])] * 2 + [np.full(len(hypotheses), _STEP_M)] * 2)
+    prior = sigma.T**-2.0
     normal_matrix += held.T @ held + prior[:, :, None] * np.eye(4)
     right += held.T @ target + prior * hypotheses
     return np.linalg.solve(normal_matrix, right[..., None])[..., 0]
 
 
 def _rows(normal: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Derivatives (..., 4) of normal . (similarity of (x, y)) by (s cos, s sin, translation)."""
+    """Derivatives (..., 4) by the hypothesis (a, b, x, y) of normal . p, p being where it puts the map's point (x, y)."""
     n_x, n_y = normal[..., 0], normal[..., 1]
     return np.stack([n_x * x + n_y * y, n_y * x - n_x * y, n_x, n_y], axis=-1)
 
 
 def _distinct(hypotheses: FloatArray, costs: FloatArray, config: AlignmentConfig) -> FloatArray:
-    """The hypotheses by rising cost, those that ICP has brought together once."""
+    """The hypotheses by rising cost, of those that ICP has brought together only the cheapest one."""
     order = np.argsort(costs, kind="stable")
     log_scale = np.log(np.hypot(hypotheses[order, 0], hypotheses[order, 1]))
     cell = np.column_stack([log_scale / config.scale_step, _rotation(hypotheses[order]) / config.turn_step_rad])
@@ -167,29 +186,31 @@ def _distinct(hypotheses: FloatArray, costs: FloatArray, config: AlignmentConfig
 
 
 def _rotation(hypotheses: FloatArray) -> FloatArray:
+    """Rotation (H,) of each hypothesis."""
     return np.arctan2(hypotheses[:, 1], hypotheses[:, 0])
 
 
 def _answer(hypotheses: FloatArray, costs: FloatArray) -> Alignment:
-    """The cheapest hypothesis, and the cheapest one that is 3 % in scale or 3 degrees away from it."""
+    """The cheapest hypothesis as a similarity, its cost, and that of the cheapest one that counts as another."""
     order = np.argsort(costs, kind="stable")
-    best, scale = order[0], np.hypot(hypotheses[:, 0], hypotheses[:, 1])
-    turn = np.abs(se2.wrap(_rotation(hypotheses) - _rotation(hypotheses)[best]))
+    best, scale, rotation = order[0], np.hypot(hypotheses[:, 0], hypotheses[:, 1]), _rotation(hypotheses)
+    turn = np.abs(se2.wrap(rotation - rotation[best]))
     other = (np.abs(np.log(scale / scale[best])) > _OTHER_SCALE) | (turn > _OTHER_TURN_RAD)
-    similarity = Similarity(float(scale[best]), float(_rotation(hypotheses)[best]), hypotheses[best, 2:])
+    similarity = Similarity(float(scale[best]), float(rotation[best]), hypotheses[best, 2:])
     return Alignment(similarity, float(costs[best]), float(np.min(costs[other], initial=1.0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Roads:
-    """Lane samples with a spatial index over (x, y, lever cos heading, lever sin heading)."""
+    """Samples of all lanes, with a spatial index."""
 
-    xy: FloatArray
-    normal: FloatArray
-    tree: cKDTree
+    xy: FloatArray  # (R, 2)
+    normal: FloatArray  # (R, 2) unit vectors to the left of the lane
+    tree: cKDTree  # over the lifted poses of the samples
 
 
 def _sampled_roads(geometry: RoadGeometry, lever_m: float) -> _Roads:
+    """A sample in the middle of every piece of lane of about ``_ROAD_SPACING_M``."""
     pieces = np.maximum(1, np.ceil(geometry.lane_length_m / _ROAD_SPACING_M).astype(np.int32))
     lane = np.repeat(np.arange(len(pieces), dtype=np.int32), pieces)
     piece = np.arange(len(lane)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
@@ -199,6 +220,6 @@ def _sampled_roads(geometry: RoadGeometry, lever_m: float) -> _Roads:
 
 
 def _lifted(poses: FloatArray, lever_m: float) -> FloatArray:
-    """Poses (..., 3) as points (N, 4) whose distance mixes position and heading."""
+    """Poses (..., 3) as points (N, 4) (x, y, lever cos heading, lever sin heading): their distance mixes position and heading."""
     flat = poses.reshape(-1, 3)
     return np.column_stack([flat[:, :2], lever_m * np.cos(flat[:, 2]), lever_m * np.sin(flat[:, 2])])

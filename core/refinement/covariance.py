@@ -1,4 +1,4 @@
-"""How sure the refined vertices are: the formal covariance, and what no drive can show about itself."""
+"""How sure the refined keyframes are: the formal covariance, and the errors that no drive can show about itself."""
 
 from __future__ import annotations
 
@@ -6,47 +6,45 @@ from dataclasses import replace
 
 import numpy as np
 
-from hippodrome.core.refinement.residuals import (
-    Group,
-    PairGroup,
-    State,
-    normal_equations,
-)
+from hippodrome.core.refinement.residuals import Factors, State, normal_equations
 from hippodrome.core.solvers.chain import factorise, marginals
 from hippodrome.core.types import Edges, FloatArray
 
-PLACE_SIGMA_M = 0.1  # of the lane as driven: corners cut, polylines for curves, wander; correlated, so it never averages out
-HEADING_SIGMA_RAD = 0.01  # likewise: a wander of 0.1 m over some 60 m
+# How far a lane as it is driven lies from the lane as it is drawn: corners are cut, curves are polylines, drivers wander. These
+# errors are correlated along the lane, so that they never average out.
+PLACE_SIGMA_M = 0.1
+HEADING_SIGMA_RAD = 0.01  # a wander of 0.1 m over some 60 m
 
 
-def posterior(state: State, steps: PairGroup, roads: Group, tied: PairGroup, edges: Edges) -> FloatArray:
-    """Covariance (S, B, B) of each visit's unknowns.
+def posterior_covariance(state: State, factors: Factors, closures: Edges) -> FloatArray:
+    """Covariance (S, 4, 4) of each keyframe's unknowns, closures included, in linear time.
 
-    The chain's marginals take the far end of a closure as known. It is as uncertain as the near one: a closure informs by
-    J^T (1 + K P K^T)^-1 J, with J and K its whitened Jacobians of the near and the far end, and P the far end's covariance
-    without any closure. Linear time; what several closures of one place have in common is neglected.
+    The marginals of the chain alone would take the far end of a closure as known, whereas it is as uncertain as the near one.
+    With J and K the closure's whitened Jacobians of its near and its far end, and P the far end's covariance without any closure,
+    a closure informs its near end by J^T (1 + K P K^T)^-1 J. What several closures of one place have in common is neglected.
     """
-    untied = replace(tied, residual=0.0 * tied.residual, here=0.0 * tied.here, there=0.0 * tied.there)
-    alone = marginals(factorise(normal_equations(state, steps, roads, untied, edges)))[0]
+    closing = factors.closures
+    silent = replace(closing, residual=0.0 * closing.residual, source=0.0 * closing.source, target=0.0 * closing.target)
+    alone = marginals(factorise(normal_equations(state, factors._replace(closures=silent), closures)))[0]
     loosened = replace(
-        tied,
-        here=_loosened(tied.here, tied.there, alone[edges.target]),
-        there=_loosened(tied.there, tied.here, alone[edges.source]),
+        closing,
+        source=_near_end(closing.source, closing.target, alone[closures.target]),
+        target=_near_end(closing.target, closing.source, alone[closures.source]),
     )
-    return marginals(factorise(normal_equations(state, steps, roads, loosened, edges)))[0]
+    return marginals(factorise(normal_equations(state, factors._replace(closures=loosened), closures)))[0]
 
 
-def _loosened(near: FloatArray, far: FloatArray, far_covariance: FloatArray) -> FloatArray:
-    """Jacobians (N, M, B) of the near end, whitened anew by what is open about the far one."""
+def _near_end(near: FloatArray, far: FloatArray, far_covariance: FloatArray) -> FloatArray:
+    """Jacobians J (N, M, 4) of the near end, whitened by the uncertainty of the far one: L^-1 J with L L^T = 1 + K P K^T."""
     spread = np.eye(near.shape[1]) + far @ far_covariance @ np.swapaxes(far, 1, 2)
     whitened: FloatArray = np.linalg.solve(np.linalg.cholesky(spread), near)
     return whitened
 
 
-def calibrated(covariance: FloatArray, survey_sigma_m: float) -> FloatArray:
-    """The formal covariance (S, 4, 4) plus what never averages out: how the road is driven, and the network's own error.
+def with_systematic_errors(covariance: FloatArray, survey_sigma_m: float) -> FloatArray:
+    """The formal covariance (S, 4, 4) plus what never averages out: how lanes are driven, and the network's own error.
 
-    In bends an error across the lane is one along it too, so that it is added to both axes.
+    Both are errors across the lane, but in bends an error across the lane is one along it too, so that both axes get them.
     """
     place = PLACE_SIGMA_M**2 + survey_sigma_m**2
     return covariance + np.diag([place, place, HEADING_SIGMA_RAD**2, 0.0])

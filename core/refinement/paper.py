@@ -1,117 +1,134 @@
-"""RC-HMM as the paper has it (mode ``paper``), Section III.B of Li et al. 2025: align, match, optimise.
+"""Refinement mode ``paper``, RC-HMM as published (Section III.B of Li et al. 2025): align, match, optimise.
 
-Where the paper is silent: the map comes into the network frame by ``alignment.align``; the closures that the map itself
-contradicts are left out, because Eq. (11) has no robust norm; matching and optimisation may alternate (``rounds``; the paper: 1).
-A map whose J stays high is bent on to the roads from its beginning (``grow``), with its closures and without; the least J wins.
+Where the paper is silent:
+
+- the map comes into the network's frame by ``alignment.align``;
+- closures that the map itself contradicts are left out, because Eq. (11) has no robust norm;
+- matching and optimisation alternate (``rounds``; the paper has one);
+- a map whose J of Eq. (12) stays high is bent on to the roads from its beginning (``bend_onto_roads``), once with its closures
+  and once without; the answer of the least J wins.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, TypeAlias
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from hippodrome.core import se2
 from hippodrome.core.matching.hmm.match import MatchedPath, PaperMatchConfig, match
-from hippodrome.core.refinement.alignment import (
-    Alignment,
-    AlignmentConfig,
-    align,
-    apply,
-)
+from hippodrome.core.refinement.alignment import Alignment, AlignmentConfig, align, apply
+from hippodrome.core.refinement.edges import edges_where
 from hippodrome.core.roads.geometry import RoadGeometry, road_geometry
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.solvers.gauss_newton import gauss_newton
 from hippodrome.core.solvers.pose_costs import global_residual, local_residual, total_residual
 from hippodrome.core.types import CognitiveMap, EdgeKind, Edges, FloatArray, Refinement, RoadMatch, StartPose
 
-BoolArray: TypeAlias = NDArray[np.bool_]
+DAMPING = 1e-6  # holds what no match determines; against the weight of one matched vertex it moves nothing
 
 
 @dataclass(frozen=True, slots=True)
 class PaperRefineConfig:
-    """Mode ``paper``."""
+    """Constants of refinement mode ``paper``."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
     matching: PaperMatchConfig = field(default_factory=PaperMatchConfig)
-    rounds: int = 4  # of match and optimise; each undoes some of the along-track error of the last projection
-    local_weight: float = 1.0  # w_l of Eq. (12)
-    global_weight: float = 0.16  # w_g of Eq. (12), 1/m^2: 2.5 m from its matched position cost a vertex 1 sigma
-    closure_gate_sigma: float = 4.0  # closures farther than this from the map's own poses are left out
-    min_sigma: tuple[float, float, float] = (0.05, 0.05, 0.005)  # floor of the edges' sigma: map units, map units, rad
+    rounds: int = 4  # times that match and optimise alternate; each undoes some of the along-track error of the last projection
+    local_weight: float = 1.0  # w_l of Eq. (12), the weight of the map's edges
+    global_weight: float = (
+        0.16  # w_g of Eq. (12), the weight of the roads, 1/m^2: a vertex 2.5 m from its matched position costs 1
+    )
+    closure_gate_sigma: float = 4.0  # closures that the map's own poses contradict by more sigmas than this are left out
+    min_sigma: tuple[float, float, float] = (0.05, 0.05, 0.005)  # least sigma of an edge: map units, map units, rad
     max_iterations: int = 20
-    bent_cost: float = 2.0  # J per vertex above which the map is taken to be too bent for one similarity: ``grow`` is tried
-    growth_prefix: int = 300  # vertices laid on the roads as one piece: enough turns to find the scale, too few to drift
-    growth_step: int = 10  # vertices: over 50 m a map runs off by less than the distance between roads
-    growth_window: int = 80  # vertices that are still bent, and that tell the local scale; what lies farther back has settled
+    bent_cost: float = 2.0  # J per vertex above which a map counts as too bent for one similarity and is grown from its beginning
+    growth_prefix: int = 300  # vertices laid on the roads as one piece when growing: they tell the scale and have hardly drifted
+    growth_step: int = 10  # vertices by which the map grows: over 50 m it runs off by less than the distance between roads
+    growth_window: int = 80  # last vertices, which are still bent and tell the local scale; those farther back have settled
     growth_rounds: int = 2
 
 
 def refine_paper(cognitive_map: CognitiveMap, network: RoadNetwork, start: StartPose, config: PaperRefineConfig) -> Refinement:
-    """The topometric map: vertices in the network frame, metres, each with its place on the roads or the reason why not."""
+    """The topometric map in mode ``paper``: poses in the network's frame, and each vertex's place on the roads or why it has
+    none.
+
+    Args:
+        cognitive_map: semi-metric.
+        network: the roads.
+        start: pose of the first vertex.
+        config: of the mode.
+    """
     geometry = road_geometry(network)
-    answer = _whole(cognitive_map, geometry, start, config)
+    answer = _rigid_answer(cognitive_map, geometry, start, config)
     for source in (cognitive_map, without_closures(cognitive_map)):
         if answer.cost_per_vertex > config.bent_cost:
-            answer = min(answer, _grown(source, geometry, start, config), key=lambda item: item.cost_per_vertex)
+            answer = min(answer, _grown_answer(source, geometry, start, config), key=lambda item: item.cost_per_vertex)
     return _refinement(cognitive_map, network, answer)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Answer:
-    poses: FloatArray
+    """A map laid on the roads in one way or the other."""
+
+    poses: FloatArray  # (V, 3) network frame
     alignment: Alignment
     matched: MatchedPath
     cost_per_vertex: float  # J of Eq. (12) over V
-    grown: bool
+    grown: bool  # bent on to the roads from its beginning, not laid on them as one piece
 
 
-def _whole(cognitive_map: CognitiveMap, geometry: RoadGeometry, start: StartPose, config: PaperRefineConfig) -> _Answer:
-    """The map laid on the roads as one piece, then matched and optimised."""
+def _rigid_answer(cognitive_map: CognitiveMap, geometry: RoadGeometry, start: StartPose, config: PaperRefineConfig) -> _Answer:
+    """The map laid on the roads as one piece by a similarity, then matched and optimised."""
     alignment = align(cognitive_map.poses, start, geometry, config.alignment)
     edges = metric_edges(trusted_edges(cognitive_map, config), alignment.similarity.scale_m)
-    return _matched_answer(apply(alignment.similarity, cognitive_map.poses), alignment, edges, geometry, config, False)
+    return _matched_and_optimised(apply(alignment.similarity, cognitive_map.poses), alignment, edges, geometry, config, False)
 
 
-def _grown(cognitive_map: CognitiveMap, geometry: RoadGeometry, start: StartPose, config: PaperRefineConfig) -> _Answer:
-    """Only a prefix laid on the roads as one piece, the rest bent on to them as ``grow`` does."""
+def _grown_answer(cognitive_map: CognitiveMap, geometry: RoadGeometry, start: StartPose, config: PaperRefineConfig) -> _Answer:
+    """The map aligned by a prefix alone and bent on to the roads from its beginning, then matched and optimised."""
     prefix = cognitive_map.poses[: config.growth_prefix]
     alignment = align(prefix, start, geometry, config.alignment)
     edges = metric_edges(trusted_edges(cognitive_map, config), alignment.similarity.scale_m)
-    poses = grow(apply(alignment.similarity, cognitive_map.poses), edges, geometry, config)
-    return _matched_answer(poses, alignment, edges, geometry, config, True)
+    poses = bend_onto_roads(apply(alignment.similarity, cognitive_map.poses), edges, geometry, config)
+    return _matched_and_optimised(poses, alignment, edges, geometry, config, True)
 
 
-def _matched_answer(
+def _matched_and_optimised(
     poses: FloatArray, alignment: Alignment, edges: Edges, geometry: RoadGeometry, config: PaperRefineConfig, grown: bool
 ) -> _Answer:
-    """``rounds`` of match and optimise; the last match is the one that the poses rest on."""
+    """``rounds`` of match and optimise. An unmatched vertex costs as much as one that is matched at the search radius."""
     matched = match(poses, geometry, config.matching)
-    poses, cost = optimise(poses, edges, matched, config)
+    poses, cost = minimise_topometric_cost(poses, edges, matched, config)
     for _ in range(config.rounds - 1):
         matched = match(poses, geometry, config.matching)
-        poses, cost = optimise(poses, edges, matched, config)
-    unmatched = float(np.sum(matched.lane < 0)) * config.global_weight * config.matching.radius_m**2  # as if at the radius
+        poses, cost = minimise_topometric_cost(poses, edges, matched, config)
+    unmatched = float(np.sum(matched.lane < 0)) * config.global_weight * config.matching.radius_m**2
     return _Answer(poses, alignment, matched, (cost + unmatched) / len(poses), grown)
 
 
-def grow(poses: FloatArray, edges: Edges, geometry: RoadGeometry, config: PaperRefineConfig) -> FloatArray:
+def bend_onto_roads(poses: FloatArray, edges: Edges, geometry: RoadGeometry, config: PaperRefineConfig) -> FloatArray:
     """Bend an aligned map on to the roads from its beginning: match and optimise a window, carry the rest along, move on.
 
     For maps that no similarity fits: heading and scale may drift as far as they like if they do so slowly.
+
+    Args:
+        poses: aligned, (V, 3) in the network's frame.
+        edges: of the map, in metres at the alignment's scale.
+        geometry: of the roads.
+        config: of the window and its steps.
     """
-    scale = 1.0  # of the window against the whole map
+    scale = 1.0  # metres of the window per metre of ``edges``
     for end in range(config.growth_step, len(poses) + config.growth_step, config.growth_step):
         end = min(end, len(poses))
         begin = max(0, end - config.growth_window)
         inner, window = metric_edges(_edges_within(edges, begin, end), scale), poses[begin:end]
         for _ in range(config.growth_rounds):
-            window, _ = optimise(window, inner, match(window, geometry, config.matching), config)
+            window, _ = minimise_topometric_cost(window, inner, match(window, geometry, config.matching), config)
         stretch = _stretch(window, inner)
         scale *= stretch
         rest = se2.between(poses[end - 1], poses[end:]) * [stretch, stretch, 1.0]
@@ -120,69 +137,71 @@ def grow(poses: FloatArray, edges: Edges, geometry: RoadGeometry, config: PaperR
 
 
 def _stretch(poses: FloatArray, edges: Edges) -> float:
-    """Length of the odometry edges as optimised over their length as measured."""
-    odometry = _subset(edges, edges.kind == EdgeKind.ODOMETRY)
+    """Length of the odometry edges between the poses over their length as measured; 1 where nothing was driven."""
+    odometry = edges_where(edges, edges.kind == EdgeKind.ODOMETRY)
     driven_m = np.linalg.norm(poses[odometry.target, :2] - poses[odometry.source, :2], axis=1).sum()
     measured_m = np.linalg.norm(odometry.motion[:, :2], axis=1).sum()
     return float(driven_m / measured_m) if measured_m > 0.0 else 1.0
 
 
 def _edges_within(edges: Edges, begin: int, end: int) -> Edges:
-    """Edges between the vertices begin:end, which are counted from 0."""
+    """The edges among the vertices begin:end, renumbered so that ``begin`` is vertex 0."""
     low, high = np.minimum(edges.source, edges.target), np.maximum(edges.source, edges.target)
     kept = (low >= begin) & (high < end)
-    inner = _subset(edges, kept)
+    inner = edges_where(edges, kept)
     return replace(inner, source=inner.source - np.int32(begin), target=inner.target - np.int32(begin))
 
 
-def _subset(edges: Edges, kept: BoolArray) -> Edges:
-    return Edges(
-        edges.source[kept], edges.target[kept], edges.motion[kept], edges.sigma[kept], edges.kind[kept], edges.margin[kept]
-    )
-
-
 def without_closures(cognitive_map: CognitiveMap) -> CognitiveMap:
-    """The same drive as dead reckoning has it: false closures that agree with each other ruin a map past mending."""
+    """The same drive by dead reckoning, for maps that false closures which agree with one another have ruined."""
     edges, visits = cognitive_map.edges, cognitive_map.visits
     kept = edges.kind == EdgeKind.ODOMETRY
     poses = cognitive_map.poses.copy()
     poses[visits.vertex] = se2.integrate(cognitive_map.poses[visits.vertex[0]], visits.motion)
-    return replace(cognitive_map, poses=poses, edges=_subset(edges, kept))
+    return replace(cognitive_map, poses=poses, edges=edges_where(edges, kept))
 
 
 def trusted_edges(cognitive_map: CognitiveMap, config: PaperRefineConfig) -> Edges:
-    """The edges less those closures that lie ``closure_gate_sigma`` from the poses of the map, sigmas floored, in map units."""
+    """The map's edges in map units, sigmas not below ``min_sigma``, without closures that its own poses contradict.
+
+    Contradicted is a closure whose residual of Eq. (11) at the map's poses exceeds ``closure_gate_sigma``.
+    """
     edges, poses = cognitive_map.edges, cognitive_map.poses
     sigma = np.maximum(edges.sigma, config.min_sigma)
     residual, _ = local_residual(poses, edges.source, edges.target, edges.motion, sigma)
     distance = np.linalg.norm(residual.reshape(-1, 3), axis=1)
     kept = (edges.kind != EdgeKind.CLOSURE) | (distance <= config.closure_gate_sigma)
-    return _subset(replace(edges, sigma=sigma), kept)
+    return edges_where(replace(edges, sigma=sigma), kept)
 
 
 def metric_edges(edges: Edges, scale_m: float) -> Edges:
-    """p_ab of Eq. (11), Li et al. 2025, in metres: the motions and their sigmas times the alignment's scale."""
+    """The edges with p_ab of Eq. (11), Li et al. 2025, and its sigmas in metres: times ``scale_m`` metres per unit."""
     metres = np.array([scale_m, scale_m, 1.0])
     return replace(edges, motion=edges.motion * metres, sigma=edges.sigma * metres)
 
 
-def optimise(poses: FloatArray, edges: Edges, matched: MatchedPath, config: PaperRefineConfig) -> tuple[FloatArray, float]:
-    """Minimum of Eq. (12), Li et al. 2025, by Gauss-Newton, and its J. Unmatched vertices hang on their edges alone."""
+def minimise_topometric_cost(
+    poses: FloatArray, edges: Edges, matched: MatchedPath, config: PaperRefineConfig
+) -> tuple[FloatArray, float]:
+    """Poses (V, 3) at the minimum of J, Eq. (12), Li et al. 2025, by Gauss-Newton, and J there.
+
+    Vertices that are not matched are held by their edges alone.
+    """
     vertex = np.flatnonzero(matched.lane >= 0).astype(np.int32)
 
     def linearise(state: FloatArray) -> tuple[FloatArray, csr_array]:
         at = state.reshape(-1, 3)
         local = local_residual(at, edges.source, edges.target, edges.motion, edges.sigma)
-        on_road = global_residual(at, vertex, matched.matched_m[vertex])
-        return total_residual(local, on_road, config.local_weight, config.global_weight)
+        global_ = global_residual(at, vertex, matched.matched_m[vertex])
+        return total_residual(local, global_, config.local_weight, config.global_weight)
 
-    damping = 1e-6  # holds what no match determines; against the weight of one matched vertex it moves nothing
-    found = gauss_newton(linearise, poses.ravel(), max_iterations=config.max_iterations, tolerance=1e-4, damping=damping)
+    found = gauss_newton(linearise, poses.ravel(), max_iterations=config.max_iterations, tolerance=1e-4, damping=DAMPING)
     poses = found.state.reshape(-1, 3)
     return np.column_stack([poses[:, :2], se2.wrap(poses[:, 2])]), 2.0 * found.cost
 
 
 def _refinement(cognitive_map: CognitiveMap, network: RoadNetwork, answer: _Answer) -> Refinement:
+    """The answer as a topometric map, with its breaks and what was estimated; the paper has no covariance."""
     matched, alignment = answer.matched, answer.alignment
     road_match = RoadMatch(network.lane_ids, matched.lane, matched.position_m, matched.status)
     log_scale = np.full(len(answer.poses), np.log(alignment.similarity.scale_m))

@@ -13,7 +13,7 @@ from hippodrome.core.types import CognitiveMap, HippodromeError, Refinement, Sta
 
 @dataclass(frozen=True, slots=True)
 class RefineConfig:
-    """``route``: unknown start and scale, decimetres. ``paper``: as published, needs a start pose."""
+    """``route``: unknown start and scale, right to decimetres. ``paper``: as published, needs a start pose."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
@@ -25,7 +25,21 @@ class RefineConfig:
 def refine(
     cognitive_map: CognitiveMap, network: RoadNetwork, config: RefineConfig | None = None, start: StartPose | None = None
 ) -> Refinement:
-    """The map in the network's frame, metres, with what could not be vouched for as breaks."""
+    """The topometric map: every vertex in the network's frame, in metres.
+
+    Args:
+        cognitive_map: a semi-metric map.
+        network: the roads of the town that it was driven in.
+        config: the mode and its constants; None is ``RefineConfig()``.
+        start: pose of the first keyframe in the network's frame, where it is known; mode ``paper`` needs it.
+
+    Returns:
+        The map with scale, covariance (mode ``route``) and place on the roads at each vertex; the stretches that could not be
+        vouched for, with the reason; and the parameters that were estimated on the way.
+
+    Raises:
+        HippodromeError: the map is refined already, or mode ``paper`` got no start pose.
+    """
     config = config or RefineConfig()
     if cognitive_map.frame != "semi-metric":
         raise HippodromeError(f"cognitive map: its frame is {cognitive_map.frame!r}; only a semi-metric map can be refined")

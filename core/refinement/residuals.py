@@ -1,170 +1,221 @@
-"""Residuals of the default refinement over (x, y, heading, log scale) per visit and the gyro's gain and bias.
+"""The factors of refinement mode ``route``: whitened residuals with their Jacobians, and the normal equations that they add up
+to.
 
-Residuals are whitened; each group holds its Jacobians by block: of the visit, of the next visit, of the border (gain, bias).
+The unknowns are (x, y, heading psi, log scale s) at each of S keyframes, s = ln(metres per map unit), and the gyro's gain error g
+and bias b. A unary factor depends on one keyframe, a binary factor on two of them and perhaps on the gyro. Residuals are
+whitened, that is, divided by their standard deviations, and multiplied by the roots of their robust weights, as are the
+Jacobians.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from hippodrome.core.refinement.noise import Noise
 from hippodrome.core.se2 import between, wrap
 from hippodrome.core.solvers.chain import ChainSystem
+from hippodrome.core.solvers.robust import geman_mcclure_weight, student_weight
 from hippodrome.core.types import Edges, FloatArray, Visits
 
-GAIN_SIGMA = 0.05  # prior: cheap gyros are calibrated to a few percent
-BIAS_SIGMA_RADPS = 0.02  # prior: about 1 deg/s
-GEMAN_MCCLURE = 3.0  # sigmas at which a closure has lost three quarters of its weight
+GAIN_SIGMA = 0.05  # prior of the gyro's gain error: cheap gyros are calibrated to a few percent
+BIAS_SIGMA_RADPS = 0.02  # prior of the gyro's bias: about 1 deg/s
+GEMAN_MCCLURE = 3.0  # error of a closure in sigmas at which it has lost three quarters of its weight
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
+    """Values of the unknowns."""
+
     poses: FloatArray  # (S, 3) network frame, m, m, rad
     log_scale: FloatArray  # (S,) ln(metres per map unit)
-    gyro: FloatArray  # (2,) gain error, bias (rad/s): turned = (1 + gain) measured + bias dt
+    gyro: FloatArray  # (2,) gain error g and bias b (rad/s): true turn = (1 + g) measured turn + b dt
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Targets:
-    """Where on the road each visit is held."""
+class RoadTargets:
+    """The point of its road that each keyframe is drawn to, and how strongly."""
 
     points_m: FloatArray  # (S, 2)
     heading_rad: FloatArray  # (S,) of the lane
     curvature_1pm: FloatArray  # (S,) of the lane, without sign
-    freedom_m: FloatArray  # (S,) lateral sigma beyond the driver's, where lanes are parallel
-    on_road: FloatArray  # (S,) 1, or 0 where nothing vouches for the road
-    along_sigma_m: float  # inf: point to line
+    added_lateral_m: FloatArray  # (S,) lateral sigma beyond the driver's: which of several parallel lanes, the survey's error
+    weight: FloatArray  # (S,) 1, or next to 0 where nothing vouches for the road
+    along_sigma_m: float  # sigma along the lane; infinite: the keyframe is drawn to the line, not to a point of it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Group:
-    """N whitened residuals of M components, already multiplied by their robust weights' roots."""
+class UnaryFactors:
+    """N factors of M components, each on one keyframe: keyframe n for factor n."""
 
-    residual: FloatArray  # (N, M)
-    here: FloatArray  # (N, M, 4)
+    residual: FloatArray  # (N, M) whitened, times the root of the weight
+    jacobian: FloatArray  # (N, M, 4) by the keyframe's unknowns, likewise
     weight: FloatArray  # (N, M) robust weights
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PairGroup(Group):
-    there: FloatArray  # (N, M, 4)
-    border: FloatArray  # (N, M, 2)
+class BinaryFactors:
+    """N factors of M components between two keyframes, source and target."""
+
+    residual: FloatArray  # (N, M) whitened, times the root of the weight
+    source: FloatArray  # (N, M, 4) Jacobian by the source's unknowns, likewise
+    target: FloatArray  # (N, M, 4) Jacobian by the target's unknowns
+    gyro: FloatArray  # (N, M, 2) Jacobian by the gyro's gain error and bias
+    weight: FloatArray  # (N, M) robust weights
 
 
-def odometry(state: State, visits: Visits, noise: Noise, unseen: FloatArray) -> PairGroup:
-    """Components: along, across, heading, log scale, between each visit and the next (N = S - 1).
+class Factors(NamedTuple):
+    """All factors at one state."""
 
-    The scale may jump: its steps are Student-t. Their weights take the expected square, of which ``unseen`` (N,) is what the
-    data leave open: where nothing tells the scale its steps look small without being so. Gyros and wheels have no outliers: where
-    a turn is drawn otherwise than driven, it is the road that is wrong.
+    odometry: BinaryFactors  # from each keyframe to the next
+    road: UnaryFactors  # on each keyframe
+    closures: BinaryFactors  # along the closure edges
+
+
+def all_factors(
+    state: State, visits: Visits, closures: Edges, targets: RoadTargets, noise: Noise, scale_step_variance: FloatArray
+) -> Factors:
+    """Odometry, road and closure factors; arguments as of the three functions below."""
+    return Factors(
+        odometry_factors(state, visits, noise, scale_step_variance),
+        road_factors(state, targets, noise),
+        closure_factors(state, closures, noise),
+    )
+
+
+def odometry_factors(state: State, visits: Visits, noise: Noise, scale_step_variance: FloatArray) -> BinaryFactors:
+    """Odometry from each keyframe i to the next (N = S - 1): along, across, heading, log scale.
+
+        r_i = Sigma_i^(-1/2) (R_i^T (p_{i+1} - p_i) - e^{s_i} m_i,  warp(psi_{i+1} - psi_i - (1 + g) w_i - b dt_i),  s_{i+1} -
+        s_i)
+
+    m_i (map units) and w_i (rad) are the raw motion. Only the steps of the scale are Student-t, as the scale may jump. Gyros and
+    wheels have no outliers: where a turn is drawn otherwise than driven, it is the road that is wrong.
+
+    Args:
+        state: where the factors are linearised.
+        visits: raw motions of the S keyframes.
+        noise: standard deviations.
+        scale_step_variance: what the data leave open about each step of the log scale, as a variance (N,). The robust weight
+            takes the *expected* squared step, to which this is added: a step that nothing tells about looks small without being
+            so.
     """
     a, b = state.poses[:-1], state.poses[1:]
     motion, dt = visits.motion[1:], np.diff(visits.t_s)
     seen, metres = between(a, b), np.exp(state.log_scale[:-1])[:, None] * motion[:, :2]
     turn = wrap(b[:, 2] - a[:, 2] - (1.0 + state.gyro[0]) * motion[:, 2] - state.gyro[1] * dt)
     residual = np.column_stack([seen[:, :2] - metres, turn, np.diff(state.log_scale)])
-    here, there = _relative_jacobians(a, seen)
-    here[:, :2, 3] = -metres
-    here[:, 3, 3], there[:, 3, 3] = -1.0, 1.0
-    border = np.zeros((len(a), 4, 2))
-    border[:, 2, 0], border[:, 2, 1] = -motion[:, 2], -dt
-    root = 1.0 / noise.step_sigmas(np.hypot(metres[:, 0], metres[:, 1]))
+    source, target = _relative_pose_jacobians(a, seen)
+    source[:, :2, 3] = -metres
+    source[:, 3, 3], target[:, 3, 3] = -1.0, 1.0
+    gyro = np.zeros((len(a), 4, 2))
+    gyro[:, 2, 0], gyro[:, 2, 1] = -motion[:, 2], -dt
+    per_sigma = 1.0 / noise.step_sigmas(np.hypot(metres[:, 0], metres[:, 1]))
     weight = np.ones_like(residual)
-    weight[:, 3] = student_weight((residual[:, 3] ** 2 + unseen) * root[:, 3] ** 2, noise.scale_tail)
-    root = root * np.sqrt(weight)
-    return PairGroup(residual * root, here * root[..., None], weight, there * root[..., None], border * root[..., None])
+    expected_sq = (residual[:, 3] ** 2 + scale_step_variance) * per_sigma[:, 3] ** 2
+    weight[:, 3] = student_weight(expected_sq, noise.scale_inverse_freedom)
+    gain = per_sigma * np.sqrt(weight)
+    return BinaryFactors(residual * gain, source * gain[..., None], target * gain[..., None], gyro * gain[..., None], weight)
 
 
-def road(state: State, targets: Targets, noise: Noise) -> Group:
-    """Components: across the lane and lane heading (both Student-t), along the lane."""
+def road_factors(state: State, targets: RoadTargets, noise: Noise) -> UnaryFactors:
+    """The road at each keyframe: across the lane and heading against the lane's (both Student-t), and along the lane.
+
+        r = (n . (p - q) / sigma_n,  warp(psi - theta) / sigma_theta,  t . (p - q) / sigma_t)
+
+    q and theta are the target's point and heading, t the lane's direction and n the one to its left. With an infinite sigma_t
+    this is the distance from a line, not from a point: the projection's error along the road is then not passed on to the pose.
+    """
     cos, sin = np.cos(targets.heading_rad), np.sin(targets.heading_rad)
     off = state.poses[:, :2] - targets.points_m
-    lateral, turned_sigma = noise.road_sigmas(targets.curvature_1pm, targets.freedom_m)
+    lateral, turned_sigma = noise.road_sigmas(targets.curvature_1pm, targets.added_lateral_m)
     across = (-sin * off[:, 0] + cos * off[:, 1]) / lateral
     along = (cos * off[:, 0] + sin * off[:, 1]) / targets.along_sigma_m
     turned = wrap(state.poses[:, 2] - targets.heading_rad) / turned_sigma
     residual = np.column_stack([across, turned, along])
-    here = np.zeros((len(off), 3, 4))
-    here[:, 0, 0], here[:, 0, 1] = -sin / lateral, cos / lateral
-    here[:, 1, 2] = 1.0 / turned_sigma
-    here[:, 2, 0], here[:, 2, 1] = cos / targets.along_sigma_m, sin / targets.along_sigma_m
-    weight = student_weight(residual**2, noise.road_tail)
+    jacobian = np.zeros((len(off), 3, 4))
+    jacobian[:, 0, 0], jacobian[:, 0, 1] = -sin / lateral, cos / lateral
+    jacobian[:, 1, 2] = 1.0 / turned_sigma
+    jacobian[:, 2, 0], jacobian[:, 2, 1] = cos / targets.along_sigma_m, sin / targets.along_sigma_m
+    weight = student_weight(residual**2, noise.road_inverse_freedom)
     weight[:, 2] = 1.0
-    weight *= targets.on_road[:, None]
-    root = np.sqrt(weight)
-    return Group(residual * root, here * root[..., None], weight)
+    weight *= targets.weight[:, None]
+    gain = np.sqrt(weight)
+    return UnaryFactors(residual * gain, jacobian * gain[..., None], weight)
 
 
-def student_weight(sq: FloatArray, tail: float) -> FloatArray:
-    """Weights of squared whitened residuals under a Student-t with 1 / ``tail`` degrees of freedom."""
-    weight: FloatArray = (1.0 + tail) / (1.0 + tail * sq)
-    return weight
+def closure_factors(state: State, closures: Edges, noise: Noise) -> BinaryFactors:
+    """Loop closures from keyframe a to keyframe b: along, across, heading; each with one Geman-McClure weight.
+
+        r_ab = Sigma^(-1/2) (R_a^T (p_b - p_a) - e^{s_a} p_ab,  warp(psi_b - psi_a - psi_ab))
+
+    That is Eq. (11), Li et al. 2025, with the scale at the source as an unknown. Source and target of ``closures`` are keyframes.
+    """
+    a, b = state.poses[closures.source], state.poses[closures.target]
+    scale = np.exp(state.log_scale[closures.source])[:, None]
+    seen, metres = between(a, b), scale * closures.motion[:, :2]
+    residual = np.column_stack([seen[:, :2] - metres, wrap(seen[:, 2] - closures.motion[:, 2])])
+    source, target = _relative_pose_jacobians(a, seen)
+    source, target = source[:, :3], target[:, :3]
+    source[:, :2, 3] = -metres
+    per_sigma = 1.0 / (noise.closure_factor * np.column_stack([scale * closures.sigma[:, :2], closures.sigma[:, 2]]))
+    weight = geman_mcclure_weight(np.sum((residual * per_sigma) ** 2, axis=1), GEMAN_MCCLURE**2)
+    gain = per_sigma * np.sqrt(weight)[:, None]
+    no_gyro, weights = np.zeros((len(a), 3, 2)), np.repeat(weight[:, None], 3, 1)
+    return BinaryFactors(residual * gain, source * gain[..., None], target * gain[..., None], no_gyro, weights)
 
 
-def closures(state: State, edges: Edges, noise: Noise) -> PairGroup:
-    """Closure edges, Geman-McClure weighted as a whole; source and target index visits."""
-    a, b = state.poses[edges.source], state.poses[edges.target]
-    scale = np.exp(state.log_scale[edges.source])[:, None]
-    seen, metres = between(a, b), scale * edges.motion[:, :2]
-    residual = np.column_stack([seen[:, :2] - metres, wrap(seen[:, 2] - edges.motion[:, 2])])
-    here, there = _relative_jacobians(a, seen)
-    here, there = here[:, :3], there[:, :3]
-    here[:, :2, 3] = -metres
-    root = 1.0 / (noise.closure_factor * np.column_stack([scale * edges.sigma[:, :2], edges.sigma[:, 2]]))
-    sq = np.sum((residual * root) ** 2, axis=1)
-    weight = (GEMAN_MCCLURE**2 / (GEMAN_MCCLURE**2 + sq)) ** 2
-    root = root * np.sqrt(weight)[:, None]
-    border = np.zeros((len(a), 3, 2))
-    return PairGroup(residual * root, here * root[..., None], np.repeat(weight[:, None], 3, 1), there * root[..., None], border)
+def normal_equations(state: State, factors: Factors, closures: Edges) -> ChainSystem:
+    """J^T J and -J^T r of all factors and of the gyro's prior, as a chain over the keyframes with the gyro as its border.
 
-
-def normal_equations(state: State, steps: PairGroup, roads: Group, tied: PairGroup, edges: Edges) -> ChainSystem:
-    """J^T J and -J^T r, without the coupling between the two ends of a closure, which lies off the chain."""
-    count = len(state.poses)
-    diagonal, rhs = _squares(roads.here, roads.residual)
-    here, rhs_here = _squares(steps.here, steps.residual)
-    there, rhs_there = _squares(steps.there, steps.residual)
-    diagonal[:-1] += here
-    diagonal[1:] += there
-    rhs[:-1] += rhs_here
-    rhs[1:] += rhs_there
-    for index, jacobian in ((edges.source, tied.here), (edges.target, tied.there)):
-        blocks, sides = _squares(jacobian, tied.residual)
-        np.add.at(diagonal, index, blocks)
-        np.add.at(rhs, index, sides)
-    border = np.zeros((count, 4, 2))
-    border[:-1] += np.einsum("nmi,nmg->nig", steps.here, steps.border)
-    border[1:] += np.einsum("nmi,nmg->nig", steps.there, steps.border)
+    The coupling J_a^T J_b between the two ends of a closure lies off the chain and is left out: the solver adds it.
+    """
+    odometry, road, closing = factors
+    diagonal, rhs = _normal_blocks(road.jacobian, road.residual)
+    by_source, rhs_source = _normal_blocks(odometry.source, odometry.residual)
+    by_target, rhs_target = _normal_blocks(odometry.target, odometry.residual)
+    diagonal[:-1] += by_source
+    diagonal[1:] += by_target
+    rhs[:-1] += rhs_source
+    rhs[1:] += rhs_target
+    for keyframe, jacobian in ((closures.source, closing.source), (closures.target, closing.target)):
+        blocks, sides = _normal_blocks(jacobian, closing.residual)
+        np.add.at(diagonal, keyframe, blocks)
+        np.add.at(rhs, keyframe, sides)
+    border = np.zeros((len(state.poses), 4, 2))
+    border[:-1] += np.einsum("nmi,nmg->nig", odometry.source, odometry.gyro)
+    border[1:] += np.einsum("nmi,nmg->nig", odometry.target, odometry.gyro)
     prior = np.array([GAIN_SIGMA, BIAS_SIGMA_RADPS]) ** -2.0
     return ChainSystem(
         diagonal=diagonal,
-        upper=np.einsum("nmi,nmj->nij", steps.here, steps.there),
+        upper=np.einsum("nmi,nmj->nij", odometry.source, odometry.target),
         border=border,
-        corner=np.einsum("nmg,nmh->gh", steps.border, steps.border) + np.diag(prior),
+        corner=np.einsum("nmg,nmh->gh", odometry.gyro, odometry.gyro) + np.diag(prior),
         rhs=rhs,
-        rhs_border=-np.einsum("nmg,nm->g", steps.border, steps.residual) - prior * state.gyro,
+        rhs_border=-np.einsum("nmg,nm->g", odometry.gyro, odometry.residual) - prior * state.gyro,
     )
 
 
-def moved(state: State, step: FloatArray, gyro_step: FloatArray) -> State:
-    """The state after a Gauss-Newton step (S, 4), (2,)."""
+def stepped(state: State, step: FloatArray, gyro_step: FloatArray) -> State:
+    """The state after a Gauss-Newton step of the keyframes (S, 4) and of the gyro (2,)."""
     poses = state.poses + step[:, :3]
     poses[:, 2] = wrap(poses[:, 2])
     return State(poses, state.log_scale + step[:, 3], state.gyro + gyro_step)
 
 
-def _squares(jacobian: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _normal_blocks(jacobian: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """J^T J (N, 4, 4) and -J^T r (N, 4) of each factor by itself."""
     return np.einsum("nmi,nmj->nij", jacobian, jacobian), -np.einsum("nmi,nm->ni", jacobian, residual)
 
 
-def _relative_jacobians(a: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives (N, 4, 4) of ``between(a, b)`` by a and by b, as far as (x, y, heading) go."""
+def _relative_pose_jacobians(a: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of ``seen = between(a, b)`` (N, 3) by a and by b, with room for a fourth row and column: (N, 4, 4) each."""
     cos, sin = np.cos(a[:, 2]), np.sin(a[:, 2])
-    here, there = np.zeros((len(a), 4, 4)), np.zeros((len(a), 4, 4))
-    there[:, 0, 0], there[:, 0, 1], there[:, 1, 0], there[:, 1, 1] = cos, sin, -sin, cos
-    here[:, :2, :2] = -there[:, :2, :2]
-    here[:, 0, 2], here[:, 1, 2] = seen[:, 1], -seen[:, 0]
-    here[:, 2, 2], there[:, 2, 2] = -1.0, 1.0
-    return here, there
+    by_a, by_b = np.zeros((len(a), 4, 4)), np.zeros((len(a), 4, 4))
+    by_b[:, 0, 0], by_b[:, 0, 1], by_b[:, 1, 0], by_b[:, 1, 1] = cos, sin, -sin, cos
+    by_a[:, :2, :2] = -by_b[:, :2, :2]
+    by_a[:, 0, 2], by_a[:, 1, 2] = seen[:, 1], -seen[:, 0]
+    by_a[:, 2, 2], by_b[:, 2, 2] = -1.0, 1.0
+    return by_a, by_b

@@ -1,7 +1,8 @@
-"""RC-HMM beyond the paper (mode ``route``): route search on raw motions, then refinement to decimetres.
+"""Refinement mode ``route``, RC-HMM beyond the paper: route search on raw motions, then refinement to decimetres.
 
-Start and scale are unknown. The vertices hang on the line of the matched route (point to line, robust), on raw odometry with
-a drifting scale and a gyro whose gain and bias are estimated, and on the loop closures that agree with it.
+Start and scale are unknown. The search finds the route from the raw motions alone. Then three kinds of factors hold every
+keyframe: the line of the route (point to line, robust), raw odometry with a drifting scale and a gyro whose gain and bias are
+estimated, and the loop closures that agree with both.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from hippodrome.core.matching.lane_choice import choose_lanes, near_lane_changes
 from hippodrome.core.matching.route_line import RouteLine, route_line
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.route import Route, search_route
-from hippodrome.core.refinement.solver import Solution, SolverConfig, optimise
+from hippodrome.core.refinement.edges import edges_where
+from hippodrome.core.refinement.solver import RouteSolution, SolverConfig, refine_along_route
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import (
     CognitiveMap,
@@ -34,7 +36,7 @@ from hippodrome.core.types import (
 
 @dataclass(frozen=True, slots=True)
 class RouteRefineConfig:
-    """Mode ``route``."""
+    """Constants of refinement mode ``route``."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
@@ -46,57 +48,55 @@ class RouteRefineConfig:
 def refine_route(
     cognitive_map: CognitiveMap, network: RoadNetwork, config: RouteRefineConfig, start: StartPose | None = None
 ) -> Refinement:
-    """The topometric map, from an unknown start unless one is given."""
-    visits, edges = cognitive_map.visits, closure_edges(cognitive_map)
+    """The topometric map in mode ``route``, from an unknown start unless one is given.
+
+    Headings alone do not tell parallel lanes apart. Where the route has such lanes, a first refinement leaves the keyframes free
+    to lie on any of them; the lanes are then chosen from its metric poses, and a second one holds the keyframes on those.
+    """
+    visits, closures = cognitive_map.visits, keyframe_closures(cognitive_map)
     route = search_route(visits, network, config.search, start)
-    status = match_status(route, config.confidence, edges, start is not None)[route.track.visit_samples()]
+    status = match_status(route, config.confidence, closures, start is not None)[route.track.visit_samples()]
     vouched = (status != MatchStatus.OFF_NETWORK).astype(np.float64)
     log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
-    line, arc = _line(route, network)
+    line, arc = _line_and_places(route, network)
     free = on_parallel_lanes(line, network)
-    solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
+    solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, config.solver)
     if np.any(free):
-        line, arc = _line(choose_lanes(solution.state.poses, vouched > 0.0, network, config.search), network)
+        chosen = choose_lanes(solution.state.poses, vouched > 0.0, network, config.search)
+        line, arc = _line_and_places(chosen, network)
         log_scale, free = solution.state.log_scale, near_lane_changes(line, network)
-        solution = optimise(visits, edges, line, arc, log_scale, vouched, free, config.solver)
+        solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, config.solver)
     status = reject_displaced(status, route, solution.state.poses, config.confidence)
     return _refinement(cognitive_map, network, line, solution, status)
 
 
-def _line(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArray]:
-    """The route's line, and where each visit lies on it (S,)."""
+def _line_and_places(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArray]:
+    """The route's line, and the arc length of each keyframe on it (S,)."""
     line, state_arc = route_line(route, network)
     return line, np.interp(route.track.visit_arc, route.track.arc, state_arc)
 
 
-def closure_edges(cognitive_map: CognitiveMap) -> Edges:
-    """The closures, with the first visit of each vertex in place of the vertex."""
-    edges = cognitive_map.edges
-    kept = edges.kind == EdgeKind.CLOSURE
-    first = first_visits(cognitive_map)
-    return Edges(
-        source=first[edges.source[kept]],
-        target=first[edges.target[kept]],
-        motion=edges.motion[kept],
-        sigma=edges.sigma[kept],
-        kind=edges.kind[kept],
-        margin=edges.margin[kept],
-    )
+def keyframe_closures(cognitive_map: CognitiveMap) -> Edges:
+    """The map's closures as edges between keyframes: in place of each vertex stands the keyframe that made it."""
+    closures = edges_where(cognitive_map.edges, cognitive_map.edges.kind == EdgeKind.CLOSURE)
+    first = first_keyframes(cognitive_map)
+    return replace(closures, source=first[closures.source], target=first[closures.target])
 
 
-def first_visits(cognitive_map: CognitiveMap) -> IntArray:
-    """Index (V,) of the visit that made each vertex."""
+def first_keyframes(cognitive_map: CognitiveMap) -> IntArray:
+    """Index (V,) of the keyframe that made each vertex. Our mapper makes one vertex per keyframe; a stored map may share them."""
     order = np.arange(len(cognitive_map.visits.vertex), dtype=np.int32)
     first = np.zeros(len(cognitive_map.poses), dtype=np.int32)
-    first[cognitive_map.visits.vertex[::-1]] = order[::-1]
+    first[cognitive_map.visits.vertex[::-1]] = order[::-1]  # written backwards: of several keyframes the first one remains
     return first
 
 
 def _refinement(
-    cognitive_map: CognitiveMap, network: RoadNetwork, line: RouteLine, solution: Solution, visit_status: UInt8Array
+    cognitive_map: CognitiveMap, network: RoadNetwork, line: RouteLine, solution: RouteSolution, keyframe_status: UInt8Array
 ) -> Refinement:
-    first = first_visits(cognitive_map)
-    status = visit_status[first]
+    """The solution at the keyframes (S) as a map of V vertices, with breaks and estimates."""
+    first = first_keyframes(cognitive_map)
+    status = keyframe_status[first]
     refined = replace(
         cognitive_map,
         frame="network",
@@ -109,6 +109,7 @@ def _refinement(
 
 
 def _road_match(network: RoadNetwork, line: RouteLine, arc_m: FloatArray, status: UInt8Array) -> RoadMatch:
+    """Lane and arc length on it at arc lengths (V,) of the route's line; unmatched where ``status`` (V,) says so."""
     sample = np.clip(np.searchsorted(line.arc_m, arc_m), 0, len(line.arc_m) - 1)
     matched = (status == MatchStatus.MATCHED) & (line.lane[sample] >= 0)
     lane = np.where(matched, line.lane[sample], -1).astype(np.int32)
@@ -117,13 +118,14 @@ def _road_match(network: RoadNetwork, line: RouteLine, arc_m: FloatArray, status
 
 
 def _covariance(covariance: FloatArray, network: RoadNetwork, status: UInt8Array) -> FloatArray:
-    """Where the route is ambiguous, the place is as good as unknown: the variance of a place anywhere in the network is added."""
+    """The covariance (V, 3, 3); where the route is ambiguous the variance of a place anywhere in the network is added."""
     anywhere = np.diag([*np.var(network.points_m, axis=0), 0.0])
     added: FloatArray = covariance + (status == MatchStatus.AMBIGUOUS)[:, None, None] * anywhere
     return added
 
 
-def _estimates(solution: Solution) -> dict[str, float]:
+def _estimates(solution: RouteSolution) -> dict[str, float]:
+    """What the refinement estimated besides the poses, by names with units."""
     noise = solution.noise
     return {
         "odometry_along_m_per_root_m": noise.along,

@@ -1,7 +1,8 @@
-"""Gauss-Newton rounds of the default refinement: project onto the route's line, solve, estimate the noise anew."""
+"""The rounds of refinement mode ``route``: project on to the route's line, solve by Gauss-Newton, estimate the noise anew."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,83 +11,97 @@ import numpy as np
 from hippodrome.core.matching.lane_choice import unknown_lane_sigma_m
 from hippodrome.core.matching.projection import reproject
 from hippodrome.core.matching.route_line import RouteLine
-from hippodrome.core.refinement.covariance import calibrated, posterior
-from hippodrome.core.refinement.noise import Noise, per_freedom, reestimated
+from hippodrome.core.refinement.covariance import posterior_covariance, with_systematic_errors
+from hippodrome.core.refinement.noise import Noise, rescaled, variance_factors
 from hippodrome.core.refinement.residuals import (
+    BinaryFactors,
+    RoadTargets,
     State,
-    Targets,
-    closures,
-    moved,
+    all_factors,
     normal_equations,
-    odometry,
-    road,
+    stepped,
 )
 from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.solvers.chain import ChainFactor, marginals, solve_coupled
 from hippodrome.core.types import Edges, FloatArray, Visits
 
+MOST_CG_STEPS = 100  # iterations of conjugate gradients; 10-30 are usual, and the next round makes up for a step cut short
+
 
 @dataclass(frozen=True, slots=True)
 class SolverConfig:
+    """Rounds of the refinement along a route."""
+
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    along_sigma_m: tuple[float, ...] = (3.0, 6.0, 12.0, *[np.inf] * 8)  # per round: let go slowly, then let the noise settle
+    along_sigma_m: tuple[float, ...] = (3.0, 6.0, 12.0, *[np.inf] * 8)  # sigma along the lane, per round; .inf: not held along it
     inner_iterations: int = 2
-    reprojection_m: float = 4.0  # arc length that a vertex may slide in one round
-    unvouched_weight: float = 1e-6  # of the road where nothing vouches for it: too little to pull, enough to be determined
-    survey_sigma_m: float = 0.0  # of the road network itself, per axis; no drive shows it, so whoever knows it must say it
-
-
-MOST_CG_STEPS = 100  # 10-30 are usual; a step cut short is made up for by the next round
+    reprojection_m: float = 4.0  # arc length by which a keyframe's place on the route may move in one round
+    unvouched_weight: float = 1e-6  # weight of the road where nothing vouches for it: it determines a pose without pulling it
+    survey_sigma_m: float = 0.0  # sigma per axis of the road network itself; no drive shows it, so whoever knows it must say it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solution:
+class RouteSolution:
+    """The refined keyframes, and what was estimated on the way."""
+
     state: State
-    arc_m: FloatArray  # (S,) on the route line
+    arc_m: FloatArray  # (S,) place of each keyframe on the route's line
     noise: Noise
     covariance: FloatArray  # (S, 4, 4) x, y, heading, log scale
 
 
-def optimise(
+def refine_along_route(
     visits: Visits,
-    edges: Edges,
+    closures: Edges,
     line: RouteLine,
     arc_m: FloatArray,
     log_scale: FloatArray,
     vouched: FloatArray,
     free: BoolArray,
     config: SolverConfig,
-) -> Solution:
-    """The most likely poses and scales of S visits, from their places ``arc_m`` (S,) on the line.
+) -> RouteSolution:
+    """The most likely poses and scales of S keyframes along a route.
 
-    ``vouched`` (S,): 1 on this road, 0 not known. ``free`` (P,): where the line's lane may be the wrong one of several.
+    Every round draws the keyframes to the points of the line that they are nearest to. The first rounds hold them there
+    lengthwise, ever more loosely, so that they find their place; the later ones do not, while the estimates of the noise settle.
+
+    Args:
+        visits: raw motions of the keyframes.
+        closures: edges between keyframes.
+        line: the route.
+        arc_m: first guess of each keyframe's place on the line, (S,).
+        log_scale: first guess of ln(metres per map unit), (S,).
+        vouched: 1 where a keyframe is known to be on this road, 0 where it is not, (S,).
+        free: samples of the line at which its lane may be the wrong one of several in parallel, (P,).
+        config: of the rounds.
     """
-    points, heading = on_line(line, arc_m)
+    points, heading = points_on_line(line, arc_m)
     state = State(np.column_stack([points, heading]), log_scale, np.zeros(2))
-    noise, unseen = Noise(), scale_variance(state, visits, Noise())
-    on_road = np.maximum(vouched, config.unvouched_weight)
+    noise = Noise()
+    scale_step_variance = prior_scale_step_variance(state, visits, noise)
+    road_weight = np.maximum(vouched, config.unvouched_weight)
     for along_sigma_m in config.along_sigma_m:
         arc_m = reproject(line, state.poses[:, :2], arc_m, config.reprojection_m)
-        points, heading = on_line(line, arc_m)
-        freedom = np.hypot(unknown_lane_sigma_m(line, arc_m, free), config.survey_sigma_m)
-        targets = Targets(points, heading, curvature(line, arc_m), freedom, on_road, along_sigma_m)
+        points, heading = points_on_line(line, arc_m)
+        added_lateral_m = np.hypot(unknown_lane_sigma_m(line, arc_m, free), config.survey_sigma_m)
+        targets = RoadTargets(points, heading, curvature(line, arc_m), added_lateral_m, road_weight, along_sigma_m)
         for _ in range(config.inner_iterations):
-            state, factor = gauss_newton_step(state, visits, edges, targets, noise, unseen)
-        noise, unseen = estimate_noise(state, visits, edges, targets, noise, unseen, factor)
-    groups = odometry(state, visits, noise, unseen), road(state, targets, noise), closures(state, edges, noise)
-    return Solution(state, arc_m, noise, calibrated(posterior(state, *groups, edges), config.survey_sigma_m))
+            state, factor = gauss_newton_step(state, visits, closures, targets, noise, scale_step_variance)
+        noise, scale_step_variance = estimate_noise(state, visits, closures, targets, noise, scale_step_variance, factor)
+    covariance = posterior_covariance(state, all_factors(state, visits, closures, targets, noise, scale_step_variance), closures)
+    return RouteSolution(state, arc_m, noise, with_systematic_errors(covariance, config.survey_sigma_m))
 
 
-def scale_variance(state: State, visits: Visits, noise: Noise) -> FloatArray:
-    """Variance (S - 1,) of the steps of the log scale before anything is seen."""
+def prior_scale_step_variance(state: State, visits: Visits, noise: Noise) -> FloatArray:
+    """Variance (S - 1,) of the steps of the log scale before any data: that of a random walk over the driven metres."""
     metres = np.exp(state.log_scale[:-1]) * np.hypot(visits.motion[1:, 0], visits.motion[1:, 1])
     variance: FloatArray = noise.step_sigmas(metres)[:, 3] ** 2
     return variance
 
 
 def curvature(line: RouteLine, arc_m: FloatArray, half_m: float = 4.0) -> FloatArray:
-    """Curvature (S,) without sign, 1/m, over ``half_m`` (a car's length) either way."""
+    """Curvature (S,) of the line in 1/m, without sign, over ``half_m`` (a car's length) either way of arc lengths (S,)."""
     heading = np.unwrap(line.heading_rad)
     turned = np.interp(arc_m + half_m, line.arc_m, heading) - np.interp(arc_m - half_m, line.arc_m, heading)
     magnitude: FloatArray = np.abs(turned) / (2.0 * half_m)
@@ -94,45 +109,69 @@ def curvature(line: RouteLine, arc_m: FloatArray, half_m: float = 4.0) -> FloatA
 
 
 def gauss_newton_step(
-    state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise, unseen: FloatArray, tolerance: float = 1e-4
+    state: State,
+    visits: Visits,
+    closures: Edges,
+    targets: RoadTargets,
+    noise: Noise,
+    scale_step_variance: FloatArray,
+    tolerance: float = 1e-4,
 ) -> tuple[State, ChainFactor]:
-    """One step on the weighted squares; ``unseen`` (S - 1,) as in ``odometry``; ``tolerance`` of the linear solution's energy."""
-    tied = closures(state, edges, noise)
-    system = normal_equations(state, odometry(state, visits, noise, unseen), road(state, targets, noise), tied, edges)
-    cross = np.einsum("nmi,nmj->nij", tied.here, tied.there)
+    """The state after one Gauss-Newton step on all factors, and the factorised normal equations of the chain.
+
+    ``tolerance`` is that of the linear solution (``chain.solve_coupled``); the other arguments are those of ``all_factors``.
+    """
+    factors = all_factors(state, visits, closures, targets, noise, scale_step_variance)
+    system = normal_equations(state, factors, closures)
+    step, gyro_step, factor = solve_coupled(system, _closure_coupling(factors.closures, closures), tolerance, MOST_CG_STEPS)
+    return stepped(state, step, gyro_step), factor
+
+
+def _closure_coupling(factors: BinaryFactors, closures: Edges) -> Callable[[FloatArray], FloatArray]:
+    """The product x -> K x (S, 4), K being the blocks J_a^T J_b and J_b^T J_a of closures a-b, which lie off the chain."""
+    cross = np.einsum("nmi,nmj->nij", factors.source, factors.target)
 
     def couple(x: FloatArray) -> FloatArray:
         product = np.zeros_like(x)
-        np.add.at(product, edges.source, np.einsum("nij,nj->ni", cross, x[edges.target]))
-        np.add.at(product, edges.target, np.einsum("nij,ni->nj", cross, x[edges.source]))
+        np.add.at(product, closures.source, np.einsum("nij,nj->ni", cross, x[closures.target]))
+        np.add.at(product, closures.target, np.einsum("nij,ni->nj", cross, x[closures.source]))
         return product
 
-    step, gyro_step, factor = solve_coupled(system, couple, tolerance, MOST_CG_STEPS)
-    return moved(state, step, gyro_step), factor
+    return couple
 
 
 def estimate_noise(
-    state: State, visits: Visits, edges: Edges, targets: Targets, noise: Noise, unseen: FloatArray, factor: ChainFactor
+    state: State,
+    visits: Visits,
+    closures: Edges,
+    targets: RoadTargets,
+    noise: Noise,
+    scale_step_variance: FloatArray,
+    factor: ChainFactor,
 ) -> tuple[Noise, FloatArray]:
-    """Sigmas from squared whitened residuals per degree of freedom left, by kind, and what the scale's steps leave open."""
+    """Noise from the squared whitened residuals per degree of freedom left, and the posterior ``scale_step_variance`` (S - 1,).
+
+    The variance of each predicted residual, J Sigma J^T with Sigma from ``factor``, is the share of a degree of freedom that the
+    solution used up; that of a step of the scale, taken back to its unit, is what the data leave open about the step.
+    """
+    odometry, road, closing = all_factors(state, visits, closures, targets, noise, scale_step_variance)
     own, next_ = marginals(factor)
-    steps, roads, tied = odometry(state, visits, noise, unseen), road(state, targets, noise), closures(state, edges, noise)
     joint = np.block([[own[:-1], next_], [np.swapaxes(next_, 1, 2), own[1:]]])
-    both = np.concatenate([steps.here, steps.there], axis=2)
-    steps_used = np.einsum("nmi,nij,nmj->nm", both, joint, both)
-    roads_used = np.einsum("nmi,nij,nmj->m", roads.here, own, roads.here)
-    plain_sq = np.sum(tied.residual**2, axis=1) / np.maximum(tied.weight[:, 0], 1e-12)
-    updated = reestimated(
+    jacobian = np.concatenate([odometry.source, odometry.target], axis=2)
+    odometry_used = np.einsum("nmi,nij,nmj->nm", jacobian, joint, jacobian)
+    road_used = np.einsum("nmi,nij,nmj->m", road.jacobian, own, road.jacobian)
+    unweighted_sq = np.sum(closing.residual**2, axis=1) / np.maximum(closing.weight[:, 0], 1e-12)
+    updated = rescaled(
         noise,
-        per_freedom(steps.residual, len(steps.residual), np.sum(steps_used, axis=0)),
-        per_freedom(roads.residual, float(np.sum(targets.on_road)), roads_used),
-        float(np.median(plain_sq)) if len(plain_sq) else None,
+        variance_factors(odometry.residual, len(odometry.residual), np.sum(odometry_used, axis=0)),
+        variance_factors(road.residual, float(np.sum(targets.weight)), road_used),
+        float(np.median(unweighted_sq)) if len(unweighted_sq) else None,
     )
-    return updated, steps_used[:, 3] / steps.weight[:, 3] * scale_variance(state, visits, noise)
+    return updated, odometry_used[:, 3] / odometry.weight[:, 3] * prior_scale_step_variance(state, visits, noise)
 
 
-def on_line(line: RouteLine, arc_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Points (S, 2) and headings (S,) at arc lengths; beyond the line's ends it runs straight on."""
+def points_on_line(line: RouteLine, arc_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points (S, 2) and headings (S,) at arc lengths (S,) of the line; beyond its ends it runs straight on."""
     heading = np.interp(arc_m, line.arc_m, np.unwrap(line.heading_rad))
     points = np.column_stack([np.interp(arc_m, line.arc_m, line.points_m[:, axis]) for axis in (0, 1)])
     beyond = arc_m - np.clip(arc_m, line.arc_m[0], line.arc_m[-1])

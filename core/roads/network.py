@@ -13,7 +13,7 @@ from hippodrome.core.types import FloatArray, IntArray
 BoolArray: TypeAlias = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RoadNetwork:
     """L directed lanes, those inside junctions included.
 
@@ -34,6 +34,10 @@ class RoadNetwork:
     successor_start: IntArray  # (L + 1,)
     left_lane: IntArray  # (L,) adjacent lane to the left, -1 where there is none
     right_lane: IntArray  # (L,) adjacent lane to the right, -1 where there is none
+
+    def __repr__(self) -> str:
+        roads, km = len(self.edge_ids), float(self.lane_lengths_m().sum()) / 1e3
+        return f"RoadNetwork({roads} roads and ways through junctions, {self.lane_count} lanes, {km:.1f} km of lanes)"
 
     @property
     def lane_count(self) -> int:

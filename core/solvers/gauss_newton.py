@@ -1,4 +1,7 @@
-"""Sparse nonlinear least squares: Gauss-Newton with a direct factorisation of the normal equations."""
+"""Sparse nonlinear least squares: Gauss-Newton with a direct factorisation of the normal equations.
+
+Source: Nocedal and Wright, Numerical Optimization, 2nd ed. 2006, section 10.3.
+"""
 
 from __future__ import annotations
 
@@ -13,27 +16,30 @@ from scipy.sparse.linalg import SuperLU, splu
 from hippodrome.core.types import FloatArray, IntArray
 
 Linearise: TypeAlias = Callable[[FloatArray], tuple[FloatArray, csr_array]]
-HALVINGS = 8  # of a step that does not lower the cost; 2^-8 of a Gauss-Newton step is no progress worth having
+HALVINGS = 8  # how often a step that raises the cost is halved; 2^-8 of a Gauss-Newton step is no progress worth having
 
 
-@dataclass(frozen=True, slots=True)
-class Solution:
+@dataclass(frozen=True, slots=True, eq=False)
+class GaussNewtonResult:
     """Where Gauss-Newton stopped."""
 
     state: FloatArray  # (n,)
     cost: float  # half the sum of squared residuals
     iterations: int
-    converged: bool
-    information: csc_array  # (n, n) J^T J at the last linearisation
+    converged: bool  # the last step was smaller than the tolerance, or lowered the cost no more
 
 
 def gauss_newton(
     linearise: Linearise, state: FloatArray, *, max_iterations: int = 20, tolerance: float = 1e-6, damping: float = 0.0
-) -> Solution:
-    """Minimise half the squared norm of the residual that ``linearise`` returns with its Jacobian; III.B.4, Li et al. 2025.
+) -> GaussNewtonResult:
+    """Minimise |r(x)|^2 / 2 by steps (J^T J + damping I) dx = -J^T r; III.B.4, Li et al. 2025. Steps that raise it are halved.
 
-    Steps that raise the cost are halved. Stops once no entry of a step exceeds ``tolerance``. ``damping`` adds a multiple of the
-    identity to the normal equations: needed only where the problem leaves a direction undetermined.
+    Args:
+        linearise: state (n,) -> residual r (m,) and its Jacobian J (m, n).
+        state: where the search begins, (n,).
+        max_iterations: steps at most.
+        tolerance: the search ends once no entry of a step exceeds this, in the state's own units.
+        damping: needed only where the problem leaves a direction undetermined; 0 is plain Gauss-Newton.
     """
     residual, jacobian = linearise(state)
     cost, converged, iterations = _cost(residual), False, 0
@@ -43,19 +49,25 @@ def gauss_newton(
         state, residual, jacobian, new_cost = _accept(linearise, state, residual, jacobian, step)
         converged = bool(np.max(np.abs(step), initial=0.0) <= tolerance) or new_cost == cost
         cost = new_cost
-    return Solution(state, cost, iterations, converged, _normal_matrix(jacobian, 0.0))
+    return GaussNewtonResult(state, cost, iterations, converged)
 
 
 def factorise(matrix: csc_array) -> SuperLU:
-    """LU factors of a symmetric positive definite matrix; symmetric order, diagonal pivots: the work and fill of Cholesky."""
+    """Sparse factors of a symmetric positive definite matrix.
+
+    SciPy has no sparse Cholesky: this LU keeps its pivots on the diagonal and one order for rows and columns, and so costs and
+    fills in no more than Cholesky would.
+    """
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def block_jacobian(blocks: list[tuple[FloatArray, IntArray]], state_size: int) -> csr_array:
-    """Jacobian (E * m, state_size) of E residuals of m rows each.
+    """Sparse Jacobian (E * m, state_size) of E residuals of m rows each, from dense blocks.
 
-    ``blocks``: for each variable that a residual depends on, its derivatives (E, m, p) and the index (E,) in the state at which
-    that variable's p entries begin.
+    Args:
+        blocks: for each variable that a residual depends on (an edge's two poses, say), the derivatives (E, m, p) of all
+            residuals by that variable, and the index (E,) in the state at which the variable's p entries begin.
+        state_size: entries of the state.
     """
     rows, columns, values = [], [], []
     for derivative, first in blocks:
@@ -71,6 +83,7 @@ def block_jacobian(blocks: list[tuple[FloatArray, IntArray]], state_size: int) -
 
 
 def _normal_matrix(jacobian: csr_array, damping: float) -> csc_array:
+    """J^T J + damping I."""
     normal = csc_array(jacobian.T @ jacobian)
     return normal if damping == 0.0 else csc_array(normal + damping * identity(normal.shape[0], format="csc"))
 
@@ -78,7 +91,10 @@ def _normal_matrix(jacobian: csr_array, damping: float) -> csc_array:
 def _accept(
     linearise: Linearise, state: FloatArray, residual: FloatArray, jacobian: csr_array, step: FloatArray
 ) -> tuple[FloatArray, FloatArray, csr_array, float]:
-    """The longest halving of the step that does not raise the cost; the old state where there is none."""
+    """The state after the longest halving of ``step`` that does not raise the cost, with its residual, Jacobian and cost.
+
+    Where even the shortest raises it, everything stays as it was.
+    """
     cost = _cost(residual)
     for halving in range(HALVINGS + 1):
         candidate = state + step * 0.5**halving
@@ -89,4 +105,5 @@ def _accept(
 
 
 def _cost(residual: FloatArray) -> float:
+    """Half the sum of squared residuals."""
     return 0.5 * float(residual @ residual)

@@ -1,6 +1,7 @@
-"""Costs of the topometric map, Eqs. (10)-(12), Li et al. 2025, as residuals with Jacobians. The state is the poses, row by row.
+"""Costs of the topometric map, Eqs. (10)-(12), Li et al. 2025, as residuals with sparse Jacobians.
 
-The paper prints sums of norms and solves "the least squares problem based on (12)"; here each norm is squared, as that needs.
+The state that the Jacobians refer to is the poses (V, 3), flattened row by row. The paper prints sums of norms and then solves
+"the least squares problem based on (12)"; least squares needs the norms squared, and so they are here.
 """
 
 from __future__ import annotations
@@ -16,7 +17,16 @@ POSE_SIZE = 3
 
 
 def global_residual(poses: FloatArray, vertex: IntArray, matched_m: FloatArray) -> tuple[FloatArray, csr_array]:
-    """Eq. (10), Li et al. 2025: p_t - z_t for the matched vertices (K,) and their matched positions (K, 2). Metres."""
+    """Eq. (10), Li et al. 2025: r_t = p_t - z_t, the way from a vertex's place on its road to the vertex.
+
+    Args:
+        poses: (V, 3) m, m, rad.
+        vertex: the matched vertices t, (K,).
+        matched_m: their matched positions z_t on the road, (K, 2).
+
+    Returns:
+        Residual (2 K,) in metres and its Jacobian (2 K, 3 V).
+    """
     residual = (poses[vertex, :2] - matched_m).ravel()
     derivative = np.broadcast_to(np.eye(2, POSE_SIZE), (len(vertex), 2, POSE_SIZE))
     return residual, block_jacobian([(derivative, POSE_SIZE * vertex)], poses.size)
@@ -25,9 +35,19 @@ def global_residual(poses: FloatArray, vertex: IntArray, matched_m: FloatArray) 
 def local_residual(
     poses: FloatArray, source: IntArray, target: IntArray, motion: FloatArray, sigma: FloatArray
 ) -> tuple[FloatArray, csr_array]:
-    """Eq. (11), Li et al. 2025: (R_a^T (p_b - p_a) - p_ab, warp(psi_b - psi_a - psi_ab)) over sigma.
+    """Eq. (11), Li et al. 2025: r_ab = Sigma^(-1/2) (R_a^T (p_b - p_a) - p_ab, warp(psi_b - psi_a - psi_ab)).
 
-    ``motion`` and ``sigma`` (E, 3) along, across, heading: Sigma is diagonal, so the Mahalanobis norm is that quotient's norm.
+    Sigma is diagonal, so that the Mahalanobis norm of the paper is the plain norm of this quotient.
+
+    Args:
+        poses: (V, 3).
+        source: vertex a of each edge, (E,).
+        target: vertex b of each edge, (E,).
+        motion: measured (p_ab, psi_ab), b seen from a: along, across, heading, (E, 3).
+        sigma: standard deviations of ``motion``, (E, 3).
+
+    Returns:
+        Whitened residual (3 E,) and its Jacobian (3 E, 3 V).
     """
     a, b = poses[source], poses[target]
     seen = se2.between(a, b)
@@ -43,7 +63,10 @@ def local_residual(
 def total_residual(
     local: tuple[FloatArray, csr_array], global_: tuple[FloatArray, csr_array], local_weight: float, global_weight: float
 ) -> tuple[FloatArray, csr_array]:
-    """Eq. (12), Li et al. 2025: w_l F + w_g G, both as least squares; half the squared norm of the result is half of J."""
+    """Eq. (12), Li et al. 2025: J = w_l F + w_g G as one residual r with |r|^2 = J, and its Jacobian.
+
+    ``local`` and ``global_`` are what ``local_residual`` (F) and ``global_residual`` (G) return. Their Jacobians are stacked.
+    """
     w_l, w_g = np.sqrt(local_weight), np.sqrt(global_weight)
     residual = np.concatenate([w_l * local[0], w_g * global_[0]])
     return residual, csr_array(vstack([w_l * local[1], w_g * global_[1]]))

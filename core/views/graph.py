@@ -1,7 +1,7 @@
 """The graph of view cells: which cell follows which, how far ahead and after how much of a turn.
 
-It grows with the visit sequence. A visit that shares a cell with an earlier one joins both paths there, so walks along the graph
-go across loop closures. Lengths are in the caller's unit.
+It grows with the visit sequence. A visit that shares a cell with an earlier one joins the two paths there, so that walks along
+the graph go across loop closures. Lengths are in the caller's unit.
 """
 
 from __future__ import annotations
@@ -10,49 +10,66 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from hippodrome.core.types import FloatArray, IntArray
 
-WALK_LIMIT = 64  # cells within one walk: some three spacings at a junction of many visits
+WALK_LIMIT = 64  # most cells within one walk: some three spacings at a junction that was visited many times
+SAME_PATH = 0.1  # a cell reached twice by lengths that differ by less than this share was reached along the same path
 
 
 class Links(NamedTuple):
-    """Directed links between cells as linked lists: O(1) to grow, and numba walks them."""
+    """L directed links between C cells, as linked lists: a link is added in constant time, and compiled code can walk them."""
 
-    last_in: IntArray  # (C,) newest link into a cell, -1: none
-    last_out: IntArray  # (C,)
-    source: IntArray  # (L,)
-    target: IntArray  # (L,)
-    next_in: IntArray  # (L,) older link into the same target
-    next_out: IntArray  # (L,) older link out of the same source
+    last_in: IntArray  # (C,) newest link into each cell, -1: none
+    last_out: IntArray  # (C,) newest link out of each cell, -1: none
+    source: IntArray  # (L,) cell at which the link begins
+    target: IntArray  # (L,) cell at which the link ends
+    next_in: IntArray  # (L,) next older link into the same target, -1: none
+    next_out: IntArray  # (L,) next older link out of the same source, -1: none
     length: FloatArray  # (L,)
     turn_rad: FloatArray  # (L,) heading change from source to target
 
 
+class Paths(NamedTuple):
+    """K paths along the graph, each by the cell at which it begins. Where they end is the holder's to say."""
+
+    source: IntArray  # (K,)
+    length: FloatArray  # (K,)
+    turn_rad: FloatArray  # (K,) heading change along the path
+
+
+class Predecessors(NamedTuple):
+    """Paths that lead to each of C cells, in CSR form: those to cell ``j`` are ``start[j]`` to ``start[j + 1]``."""
+
+    start: IntArray  # (C + 1,)
+    paths: Paths
+
+
 class CellGraph:
-    """Grows by ``add_cell`` and ``link``; read through ``links``."""
+    """The growing graph: ``add_cell`` and ``link`` extend it, ``links`` reads it."""
 
     def __init__(self) -> None:
         self.cell_count = 0
         self._link_count = 0
-        self._links = _room_for(64, 64)
+        self._links = _empty_links(64, 64)
 
     @property
     def links(self) -> Links:
-        """Everything so far; the arrays are views and must not be written to."""
-        return _cut(self._links, self.cell_count, self._link_count)
+        """All links so far; the arrays are views of the graph's own and must not be written to."""
+        return _first_of(self._links, self.cell_count, self._link_count)
 
     def add_cell(self) -> int:
-        """A new cell without links; returns its number."""
+        """Add a cell without links; returns its number."""
         if self.cell_count == len(self._links.last_in):
-            self._links = _moved(self.links, _room_for(2 * self.cell_count, len(self._links.source)))
+            self._links = _copied_into(_empty_links(2 * self.cell_count, len(self._links.source)), self.links)
         self.cell_count += 1
         return self.cell_count - 1
 
     def link(self, source: int, target: int, length: float, turn_rad: float) -> None:
-        """The path from ``source`` to ``target`` that was just driven."""
+        """Add the path from ``source`` to ``target`` that was just driven."""
         if self._link_count == len(self._links.source):
-            self._links = _moved(self.links, _room_for(len(self._links.last_in), 2 * self._link_count))
+            self._links = _copied_into(_empty_links(len(self._links.last_in), 2 * self._link_count), self.links)
         arrays, new = self._links, self._link_count
         arrays.source[new], arrays.target[new] = source, target
         arrays.length[new], arrays.turn_rad[new] = length, turn_rad
@@ -61,13 +78,20 @@ class CellGraph:
         self._link_count += 1
 
     def joins(self, source: int, target: int, length: float, tolerance: float) -> bool:
-        """Whether a path of about this length leads from ``source`` to ``target`` already."""
-        cells, lengths, _ = walk_back(self.links, target, length + tolerance)
-        return bool(np.any((cells == source) & (np.abs(lengths - length) <= tolerance)))
+        """Whether a path of this length, within ``tolerance``, leads from ``source`` to ``target`` already."""
+        paths = walk_back(self.links, target, length + tolerance)
+        return bool(np.any((paths.source == source) & (np.abs(paths.length - length) <= tolerance)))
 
 
 def graph_of(cells: IntArray, lengths: FloatArray, turns_rad: FloatArray, tolerance: float) -> CellGraph:
-    """The graph of a finished visit sequence (S,): the cell of each visit, travel and turn since the visit before."""
+    """The graph of a finished visit sequence.
+
+    Args:
+        cells: the cell of each visit (S,).
+        lengths: path length since the visit before (S,); row 0 is not used.
+        turns_rad: turn since the visit before (S,); row 0 is not used.
+        tolerance: a path that exists already, its length within this, is not added again.
+    """
     graph = CellGraph()
     for _ in range(int(cells.max(initial=-1)) + 1):
         graph.add_cell()
@@ -77,7 +101,9 @@ def graph_of(cells: IntArray, lengths: FloatArray, turns_rad: FloatArray, tolera
     return graph
 
 
-def _room_for(cells: int, links: int) -> Links:
+def _empty_links(cells: int, links: int) -> Links:
+    """Arrays with room for so many cells and links, none of them there yet."""
+
     def none(size: int) -> IntArray:
         return np.full(size, -1, dtype=np.int32)
 
@@ -86,7 +112,8 @@ def _room_for(cells: int, links: int) -> Links:
     )  # fmt: skip
 
 
-def _cut(links: Links, cells: int, count: int) -> Links:
+def _first_of(links: Links, cells: int, count: int) -> Links:
+    """Views of the first ``cells`` cells and the first ``count`` links."""
     return Links(
         last_in=links.last_in[:cells],
         last_out=links.last_out[:cells],
@@ -99,34 +126,40 @@ def _cut(links: Links, cells: int, count: int) -> Links:
     )
 
 
-def _moved(links: Links, room: Links) -> Links:
-    """``room`` filled with ``links``."""
-    start = _cut(room, len(links.last_in), len(links.source))
+def _copied_into(larger: Links, links: Links) -> Links:
+    """``larger`` with the cells and links of ``links`` in its first places."""
+    first = _first_of(larger, len(links.last_in), len(links.source))
     for name in Links._fields:
-        getattr(start, name)[:] = getattr(links, name)
-    return room
+        getattr(first, name)[:] = getattr(links, name)
+    return larger
 
 
 @njit(cache=True)
-def walk_back(links: Links, start: int, reach: float) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Cells (K,) from which ``start`` is reached within ``reach``, the path's length and turn (K,); first ``start`` itself."""
-    cells, lengths, turns = np.empty(WALK_LIMIT, dtype=np.int32), np.empty(WALK_LIMIT), np.empty(WALK_LIMIT)
-    count = walk_back_into(links, start, reach, cells, lengths, turns)
-    return cells[:count], lengths[:count], turns[:count]
+def walk_back(links: Links, start: int, reach: float) -> Paths:
+    """The paths no longer than ``reach`` that lead to ``start``, at most WALK_LIMIT; first that of no length from itself."""
+    walk = empty_walk()
+    count = walk_back_into(walk, links, start, reach)
+    return Paths(walk.source[:count], walk.length[:count], walk.turn_rad[:count])
 
 
 @njit(cache=True)
-def walk_back_into(links: Links, start: int, reach: float, cells: IntArray, lengths: FloatArray, turns: FloatArray) -> int:
-    """``walk_back`` into buffers of WALK_LIMIT; returns how many entries are valid."""
-    cells[0], lengths[0], turns[0] = start, 0.0, 0.0
+def empty_walk() -> Paths:
+    """Room for WALK_LIMIT paths."""
+    return Paths(np.empty(WALK_LIMIT, dtype=np.int32), np.empty(WALK_LIMIT), np.empty(WALK_LIMIT))
+
+
+@njit(cache=True)
+def walk_back_into(walk: Paths, links: Links, start: int, reach: float) -> int:
+    """Write the paths of ``walk_back`` into ``walk``, breadth first; returns how many there are."""
+    walk.source[0], walk.length[0], walk.turn_rad[0] = start, 0.0, 0.0
     count, at = 1, 0
     while at < count:
-        link = links.last_in[cells[at]]
+        link = links.last_in[walk.source[at]]
         while link >= 0:
-            length = lengths[at] + links.length[link]
-            if length <= reach and count < WALK_LIMIT and not _holds(cells, lengths, count, links.source[link], length):
-                cells[count], lengths[count] = links.source[link], length
-                turns[count] = turns[at] + links.turn_rad[link]
+            length = walk.length[at] + links.length[link]
+            if length <= reach and count < WALK_LIMIT and not _holds(walk, count, links.source[link], length):
+                walk.source[count], walk.length[count] = links.source[link], length
+                walk.turn_rad[count] = walk.turn_rad[at] + links.turn_rad[link]
                 count += 1
             link = links.next_in[link]
         at += 1
@@ -134,16 +167,16 @@ def walk_back_into(links: Links, start: int, reach: float, cells: IntArray, leng
 
 
 @njit(cache=True)
-def _holds(cells: IntArray, lengths: FloatArray, count: int, cell: int, length: float) -> bool:
-    """Whether a walk came by this cell at about this length before (the same path found twice)."""
+def _holds(walk: Paths, count: int, cell: int, length: float) -> bool:
+    """Whether one of the first ``count`` paths begins at this cell and is about as long: the same path found twice."""
     for k in range(count):  # noqa: SIM110 (numba)
-        if cells[k] == cell and abs(lengths[k] - length) <= 0.1 * length:
+        if walk.source[k] == cell and abs(walk.length[k] - length) <= SAME_PATH * length:
             return True
     return False
 
 
 @njit(cache=True)
-def neighbourhood(links: Links, start: int, reach: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def neighbourhood(links: Links, start: int, reach: float) -> NDArray[np.bool_]:
     """Mask (C,) of the cells within ``reach`` of ``start`` along links in either direction."""
     inside = np.zeros(len(links.last_in), dtype=np.bool_)
     distance = np.full(len(links.last_in), np.inf)

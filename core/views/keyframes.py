@@ -1,7 +1,9 @@
-"""When a new view is due, without knowing the scale: after a typical time's travel or a turn, never while standing still.
+"""When a new keyframe is due: after a typical time's travel, or a turn, but never while standing still. No scale is needed.
 
-The unit of speed is unknown, so "typical" comes from the drive itself: the median speed while moving. Multiplying all
-speeds by a constant multiplies all lengths by it and changes nothing else.
+The unit of speed is unknown, so that "typical" has to come from the drive itself: it is the median speed while moving.
+Multiplying all speeds by a constant multiplies all lengths by it and changes nothing else.
+
+State is immutable: ``start``, then ``advance`` with every observation; where ``is_due``, take the keyframe and ``restart``.
 """
 
 from __future__ import annotations
@@ -16,19 +18,19 @@ from numba import njit
 from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, IntArray, Observation
 
-BINS_PER_E = 20  # histogram of log speed: 5 % per bin
+BINS_PER_E = 20  # bins of the histogram of log speed per factor of e: 5 % of speed each
 HALF_RANGE = 256  # bins on either side of the first speed: a factor of e^12.8
 
 
 @dataclass(frozen=True)
-class ViewStepConfig:
-    """How densely the drive is mapped."""
+class KeyframeConfig:
+    """How densely keyframes follow one another."""
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
-    interval_s: float = 0.6  # at the median moving speed: about 5 m at 30 km/h
-    turn_rad: float = math.radians(10.0)  # a turn changes the view faster than travel does
-    moving_share: float = 0.2  # of the 90th percentile of speed: below it the vehicle stands, and speed is noise
+    interval_s: float = 0.6  # between keyframes on a straight road at the median moving speed: about 5 m at 30 km/h
+    turn_rad: float = math.radians(10.0)  # turn after which a keyframe is due anyway: turning changes the view faster than travel
+    moving_share: float = 0.2  # share of the 90th percentile of speed below which the vehicle stands and speed is noise
 
     def __post_init__(self) -> None:
         if self.interval_s <= 0.0 or self.turn_rad <= 0.0 or not 0.0 < self.moving_share < 1.0:
@@ -36,37 +38,37 @@ class ViewStepConfig:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ViewStepState:
-    """Motion since the last view and the speeds so far."""
+class KeyframeState:
+    """Motion since the last keyframe, and the distribution of the speeds so far."""
 
-    motion: FloatArray  # (3,) raw body motion since the last view, map units and rad
-    travelled: float  # path length since the last view
-    turned_rad: float  # magnitude of the turn since the last view, while moving
-    spacing: float  # map units between views on a straight road; 0 before the first motion
-    slowest: float  # speeds below are standing still
-    first_speed: float  # the histogram's centre; 0 before the first motion
-    histogram: IntArray  # (2 HALF_RANGE + 1,) of log speeds
-
-
-def start() -> ViewStepState:
-    """Before the first observation."""
-    return ViewStepState(np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(2 * HALF_RANGE + 1, dtype=np.int32))
+    motion: FloatArray  # (3,) raw body motion since the last keyframe, map units and rad
+    travelled: float  # path length since the last keyframe, while moving, map units
+    turned_rad: float  # signed turn since the last keyframe, while moving
+    spacing: float  # map units between keyframes on a straight road; 0 before the first motion
+    slowest: float  # speeds up to this one count as standing still
+    first_speed: float  # centre of the histogram; 0 before the first motion
+    histogram: IntArray  # (2 HALF_RANGE + 1,) counts of log speeds
 
 
-def advance(state: ViewStepState, observation: Observation, config: ViewStepConfig) -> ViewStepState:
-    """One observation's motion added."""
+def start() -> KeyframeState:
+    """The state before the first observation."""
+    return KeyframeState(np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(2 * HALF_RANGE + 1, dtype=np.int32))
+
+
+def advance(state: KeyframeState, observation: Observation, config: KeyframeConfig) -> KeyframeState:
+    """The state after one more observation: its motion is added, and its speed counts for what is typical."""
     speed, dt_s = abs(observation.speed), observation.dt_s
     first = state.first_speed or speed
     histogram, spacing, slowest = state.histogram, state.spacing, state.slowest
     if speed > 0.0:
         histogram = histogram.copy()
         histogram[_bin(speed, first)] += 1
-        typical, slowest = _speeds(histogram, first, config.moving_share)
+        typical, slowest = _typical_and_slowest(histogram, first, config.moving_share)
         spacing = typical * config.interval_s
     turn_rad = observation.yaw_rate_radps * dt_s
     moving = speed > slowest
-    return ViewStepState(
-        motion=se2.compose(state.motion, arc(observation.speed * dt_s, turn_rad)),
+    return KeyframeState(
+        motion=se2.compose(state.motion, arc_motion(observation.speed * dt_s, turn_rad)),
         travelled=state.travelled + (speed * dt_s if moving else 0.0),
         turned_rad=state.turned_rad + (turn_rad if moving else 0.0),
         spacing=spacing,
@@ -76,32 +78,33 @@ def advance(state: ViewStepState, observation: Observation, config: ViewStepConf
     )
 
 
-def is_due(state: ViewStepState, config: ViewStepConfig) -> bool:
-    """Whether the view has changed enough to be worth a visit."""
+def is_due(state: KeyframeState, config: KeyframeConfig) -> bool:
+    """Whether the view has changed enough since the last keyframe for a new one."""
     if state.spacing == 0.0:
         return False
     nearly = 1.0 - 1e-9  # sums of equal steps must not miss their multiple by rounding
     return state.travelled >= nearly * state.spacing or abs(state.turned_rad) >= nearly * config.turn_rad
 
 
-def restart(state: ViewStepState) -> ViewStepState:
-    """A view was taken: motion starts anew, the speeds stay."""
-    return ViewStepState(np.zeros(3), 0.0, 0.0, state.spacing, state.slowest, state.first_speed, state.histogram)
+def restart(state: KeyframeState) -> KeyframeState:
+    """The state after a keyframe was taken: motion counts from zero again, the speeds are remembered."""
+    return KeyframeState(np.zeros(3), 0.0, 0.0, state.spacing, state.slowest, state.first_speed, state.histogram)
 
 
-def arc(length: float, turn_rad: float) -> FloatArray:
-    """Body motion (3,) along a circular arc: the chord points half the turn ahead."""
+def arc_motion(length: float, turn_rad: float) -> FloatArray:
+    """Body motion (3,) along a circular arc of a given length: its chord points half the turn to the left of ahead."""
     half = 0.5 * turn_rad
     chord = length * (math.sin(half) / half if abs(half) > 1e-6 else 1.0)
     return np.array([chord * math.cos(half), chord * math.sin(half), turn_rad])
 
 
 def _bin(speed: float, first: float) -> int:
+    """Bin of a speed; the outermost bins take everything beyond."""
     return HALF_RANGE + max(-HALF_RANGE, min(HALF_RANGE, round(BINS_PER_E * math.log(speed / first))))
 
 
-def _speeds(histogram: IntArray, first: float, moving_share: float) -> tuple[float, float]:
-    """Median speed while moving, and the speed below which the vehicle stands."""
+def _typical_and_slowest(histogram: IntArray, first: float, moving_share: float) -> tuple[float, float]:
+    """Median speed while moving, and the speed up to which the vehicle counts as standing."""
     fast, typical = _quantile_bins(histogram, BINS_PER_E * math.log(moving_share))
     speed = first * math.exp((typical - HALF_RANGE) / BINS_PER_E)
     return speed, moving_share * first * math.exp((fast - HALF_RANGE) / BINS_PER_E)
@@ -109,13 +112,14 @@ def _speeds(histogram: IntArray, first: float, moving_share: float) -> tuple[flo
 
 @njit(cache=True)
 def _quantile_bins(histogram: IntArray, below_fast: float) -> tuple[int, int]:
-    """Bins of the 90th percentile of all speeds, and of the median of those no more than ``-below_fast`` bins slower."""
+    """Bin of the 90th percentile of all speeds, and of the median of those at most ``-below_fast`` bins slower than it."""
     fast = _quantile(histogram, 0, 0.9)
     return fast, _quantile(histogram, max(0, int(np.ceil(fast + below_fast))), 0.5)
 
 
 @njit(cache=True)
 def _quantile(histogram: IntArray, first: int, share: float) -> int:
+    """First bin from ``first`` on at which ``share`` of the counts from there on is reached."""
     wanted = share * histogram[first:].sum()
     total = 0
     for index in range(first, len(histogram)):

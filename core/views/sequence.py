@@ -1,35 +1,36 @@
-"""Sequence evidence on the graph of view cells: one view may lie, three along a path that exists hardly do."""
+"""Sequence evidence: similarity scores of single views, filtered along the paths between view cells.
+
+One view may look like a wrong place by chance. Several views in a row hardly do so along a path that exists. The filter therefore
+adds to the score of each cell the evidence that the cells one driven step behind it had gathered. The mapper applies it to the
+paths that it has driven, the localizer to all paths that the geometry of the finished map allows.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from hippodrome.core.types import Float32Array, IntArray
-from hippodrome.core.views.graph import (
-    WALK_LIMIT,
-    Links,
-    neighbourhood,
-    walk_back_into,
-)
+from hippodrome.core.views.graph import Links, Paths, Predecessors, empty_walk, neighbourhood, walk_back_into
 
 
 @dataclass(frozen=True)
 class SequenceConfig:
-    """Lengths are in view spacings, so that nothing depends on the unit."""
+    """Constants of the sequence filter. Lengths are in units of the view spacing, so that nothing depends on the map's scale."""
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
-    memory: float = 0.6  # lambda: about three views; longer chains run straight on at junctions
-    length_tolerance: float = 0.6  # predecessors 2-8 m behind at 5 m spacing
-    turn_tolerance_rad: float = 0.5  # between the turn driven and the turn along the path: tells the legs of a junction apart
+    memory: float = 0.6  # lambda, the weight of earlier evidence: about three views; longer chains run straight on at junctions
+    length_tolerance: float = 0.6  # largest difference of a path's length to the way driven: 2 to 8 m fit at a spacing of 5 m
+    turn_tolerance_rad: float = 0.5  # largest difference of a path's turn to the turn driven: tells the legs of a junction apart
     neighbourhood: float = 3.0  # cells closer than this to the best one show the same place and are no rivals
-    min_cells: int = 30  # fewer make no statistics: a z-score over a handful divides by next to nothing
-    sigma_floor: float = 0.03  # cosine: the spread that pure noise has at 1,024 dimensions
-    grey_sigma_floor: float = 1.0  # grey levels, the same for "grey"
+    min_cells: int = 30  # fewer cells make no statistics, and give no evidence: the spread of a handful is next to nothing
+    sigma_floor: float = 0.03  # smallest spread of cosine similarities to divide by: that of pure noise in 1,024 dimensions
+    grey_sigma_floor: float = 1.0  # smallest spread of similarities of kind "grey" to divide by, in grey levels
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.memory < 1.0:
@@ -39,6 +40,10 @@ class SequenceConfig:
         if self.min_cells < 2:
             raise ValueError(f"sequence: min_cells must be at least 2, got {self.min_cells}")
 
+    def floor(self, kind: str) -> float:
+        """Smallest standard deviation to divide similarities by, for view cells of this kind."""
+        return self.sigma_floor if kind == "gradient" else self.grey_sigma_floor
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
@@ -46,15 +51,22 @@ class Evidence:
 
     filtered: Float32Array  # (C,) F_t
     z_score: Float32Array  # (C,) z_t
-    predecessor: IntArray  # (C,) cell of the view before on the best path here, -1: none
+    predecessor: IntArray  # (C,) cell of the view before, on the best path to this cell; -1: none
 
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """The best cell and how far it stands out."""
+    """The cell with the most evidence, and how far it stands out."""
 
     cell: int  # -1: no cells
-    margin: float  # best minus best outside its neighbourhood
+    margin: float  # its evidence minus that of the best cell outside its neighbourhood
+
+
+class Step(NamedTuple):
+    """Motion between two views, along a path or as driven."""
+
+    length: float  # in the unit of the map: map units while mapping, metres while localizing
+    turn_rad: float
 
 
 NO_EVIDENCE = Evidence(np.zeros(0, dtype=np.float32), np.zeros(0, dtype=np.float32), np.zeros(0, dtype=np.int32))
@@ -71,46 +83,94 @@ def standardise(similarity: Float32Array, min_cells: int, sigma_floor: float) ->
 def filter_step(
     before: Evidence, z: Float32Array, links: Links, travelled: float, turned_rad: float, spacing: float, config: SequenceConfig
 ) -> Evidence:
-    """F_t(j) = (1 - lambda) z_t(j) + lambda max(0, max over predecessors i of j of F_{t-1}(i)).
+    """Evidence for all C cells of a growing graph, after one view more. See ``_evidence_at`` for the formula.
 
-    A predecessor lies one driven step behind: a path of about ``travelled`` length and ``turned_rad`` leads from it to j.
+    Args:
+        before: evidence after the view before; cells that were added since had none.
+        z: z-scores (C,) of this view.
+        links: the graph of the C cells.
+        travelled: path length since the view before, in the unit of the links.
+        turned_rad: turn since the view before.
+        spacing: typical distance between views, in the unit of the links.
+        config: memory and tolerances of the filter.
     """
-    filtered, predecessor = _propagate(
-        before.filtered, z, links, travelled, turned_rad,
-        config.length_tolerance * spacing, config.turn_tolerance_rad, np.float32(config.memory),
-    )  # fmt: skip
+    tolerance = Step(config.length_tolerance * spacing, config.turn_tolerance_rad)
+    filtered, predecessor = _propagate_along(
+        links, before.filtered, z, Step(travelled, turned_rad), tolerance, np.float32(config.memory)
+    )
     return Evidence(filtered, z, predecessor)
 
 
 @njit(cache=True)
-def _propagate(
-    before: Float32Array, z: Float32Array, links: Links, travelled: float, turned_rad: float,
-    length_tolerance: float, turn_tolerance_rad: float, memory: np.float32,
-) -> tuple[Float32Array, IntArray]:  # fmt: skip
-    filtered = np.empty(len(z), dtype=np.float32)
-    predecessor = np.full(len(z), -1, dtype=np.int32)
-    cells, lengths, turns = np.empty(WALK_LIMIT, dtype=np.int32), np.empty(WALK_LIMIT), np.empty(WALK_LIMIT)
+def _propagate_along(
+    links: Links, before: Float32Array, z: Float32Array, driven: Step, tolerance: Step, memory: np.float32
+) -> tuple[Float32Array, IntArray]:
+    """F_t (C,) of all cells of a graph, and the predecessor (C,) that each took its evidence from, -1 where there was none."""
+    filtered, predecessor = np.empty(len(z), dtype=np.float32), np.full(len(z), -1, dtype=np.int32)
+    walk = empty_walk()
     for j in range(len(z)):
-        best = np.float32(0.0)
-        for k in range(walk_back_into(links, j, travelled + length_tolerance, cells, lengths, turns)):
-            i = cells[k]
-            fits = abs(lengths[k] - travelled) <= length_tolerance and abs(turns[k] - turned_rad) <= turn_tolerance_rad
-            if fits and i < len(before) and before[i] > best:
-                best, predecessor[j] = before[i], i
-        filtered[j] = (np.float32(1.0) - memory) * z[j] + memory * best
+        count = walk_back_into(walk, links, j, driven.length + tolerance.length)
+        filtered[j], predecessor[j] = _evidence_at(before, z[j], walk, 0, count, driven, tolerance, memory)
     return filtered, predecessor
 
 
+@njit(cache=True)
+def propagate(
+    before: Float32Array,
+    cells: IntArray,
+    z: Float32Array,
+    predecessors: Predecessors,
+    driven: Step,
+    tolerance: Step,
+    memory: np.float32,
+) -> Float32Array:
+    """F_t (C,) on a map whose paths were laid out beforehand.
+
+    Args:
+        before: F_{t-1} (C,).
+        cells: cells (K,) that this view was scored against; the other cells are left without evidence.
+        z: z-scores (K,) of these cells.
+        predecessors: the paths that lead to each of the C cells.
+        driven: motion since the view before.
+        tolerance: largest differences between the motion driven and a path.
+        memory: lambda, the weight of the evidence so far, in [0, 1).
+    """
+    filtered = np.zeros_like(before)
+    for n in range(len(cells)):
+        first, last = predecessors.start[cells[n]], predecessors.start[cells[n] + 1]
+        filtered[cells[n]], _ = _evidence_at(before, z[n], predecessors.paths, first, last, driven, tolerance, memory)
+    return filtered
+
+
+@njit(cache=True, inline="always")  # a call for each cell would take half as long again
+def _evidence_at(
+    before: Float32Array, z: np.float32, paths: Paths, first: int, last: int, driven: Step, tolerance: Step, memory: np.float32
+) -> tuple[np.float32, int]:
+    """F_t(j) = (1 - memory) z_t(j) + memory max(0, max over predecessors i of j of F_{t-1}(i)), and that predecessor or -1.
+
+    The predecessors are the sources of ``paths[first:last]`` that are as long as the distance driven and turn as the vehicle
+    did. Cells beyond the end of ``before`` were added since and had no evidence. Of equal predecessors the first is taken.
+    """
+    best, predecessor = np.float32(0.0), -1
+    for k in range(first, last):
+        i = paths.source[k]
+        as_long = abs(paths.length[k] - driven.length) <= tolerance.length
+        fits = as_long and abs(paths.turn_rad[k] - driven.turn_rad) <= tolerance.turn_rad
+        if fits and i < len(before) and before[i] > best:
+            best, predecessor = before[i], i
+    return (np.float32(1.0) - memory) * z + memory * best, predecessor
+
+
 def peak(evidence: Evidence, links: Links, reach: float) -> Peak:
-    """The best cell and its margin over the best one farther than ``reach`` along the graph (0 when there is none)."""
+    """The best cell, and its margin over the best one farther than ``reach`` along the graph (0 when there is none)."""
     if len(evidence.filtered) == 0:
         return Peak(-1, 0.0)
     best = int(np.argmax(evidence.filtered))
     return Peak(best, margin_over(evidence.filtered, best, ~neighbourhood(links, best, reach)))
 
 
-def margin_over(filtered: Float32Array, best: int, rivals: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
-    """Best minus best of the rivals (mask (C,)); 0 without rivals. A localizer with a metric map passes those > 15 m away."""
+def margin_over(filtered: Float32Array, best: int, rivals: NDArray[np.bool_]) -> float:
+    """Evidence of the cell ``best`` minus that of the best of the rivals (mask (C,)); 0 without rivals."""
     if not rivals.any():
         return 0.0
     return float(filtered[best] - filtered[rivals].max())

@@ -10,14 +10,14 @@ from pathlib import Path
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.errors import file_errors
 from hippodrome.eval.authoring.network_notes import network_notes
-from hippodrome.eval.evaluate import DEAD_RECKONING, MODES, SEMI_METRIC
 from hippodrome.eval.files.scenarios import read_scenario
+from hippodrome.eval.methods.method import ALWAYS
 from hippodrome.sim.record import ROLES
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import TourGraph, tour_graph, toured_area
 from hippodrome.sim.town import build_town
 
-ROWS = (*(method for method, _ in MODES), SEMI_METRIC, DEAD_RECKONING)  # that limits can speak of
+ROWS = tuple(method.label for method in ALWAYS)  # rows of every evaluation, so that limits can be for them
 
 
 @dataclass(frozen=True, slots=True)

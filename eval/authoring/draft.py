@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 import yaml
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.files.scenarios import PACKAGE, located
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import tour_graph
@@ -24,13 +24,13 @@ from hippodrome.sim.types import Town
 from hippodrome.sim.yaml_file import ScenarioError, load_yaml
 
 KINDS: Final = ("rural", "grid", "radial", "random")
-TOUR_SHARE = 1.3  # of the drivable roads: all of them once, and 40 % of the drive on roads seen before
-TOUR_M = (1500.0, 7200.0)  # shorter drives close too few loops; the upper end is the paper's drive
-LOCALIZATION_SHARE = 1 / 3  # of the mapping tour
-LOCALIZATION_M = (500.0, 1800.0)  # the upper end is the paper's long test drive
-VEHICLES_PER_KM = 3.0  # of the toured roads: one in sight most of the time, no queues
-FAST_MPS = 15.0  # beyond, 5 Hz leave more than 3 m between views
-ROUND_TO_M = 100.0
+TOUR_SHARE = 1.3  # length of the mapping tour over that of the drivable roads: all of them once, and 40 % seen before
+TOUR_M = (1500.0, 7200.0)  # limits of the mapping tour: shorter ones close too few loops; the upper end is the paper's drive
+LOCALIZATION_SHARE = 1 / 3  # length of the second drive's tour over that of the mapping tour
+LOCALIZATION_M = (500.0, 1800.0)  # limits of the second drive's tour; the upper end is the paper's long test drive
+VEHICLES_PER_KM = 3.0  # vehicles per kilometre of toured road: one in sight most of the time, no queues
+FAST_MPS = 15.0  # median speed limit from which 10 frames a second are taken: 5 would leave more than 3 m between views
+ROUND_TO_M = 100.0  # lengths of tours are rounded to this
 
 TEMPLATE = """\
 # {title}
@@ -58,20 +58,27 @@ thresholds:  # hippodrome eval exits with 1 where one of them does not hold
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """What the network suggests."""
+    """Values that suit a road network."""
 
-    tour_m: float
-    second_m: float
-    vehicles: int
-    rate_hz: float
-    drivable_km: float
-    notes: tuple[str, ...]
+    tour_m: float  # length of the mapping tour
+    second_m: float  # length of the localization tour
+    vehicles: int  # on the road at the same time while mapping
+    rate_hz: float  # frames a second
+    drivable_km: float  # length of the roads that can be toured
+    notes: tuple[str, ...]  # what is odd about the network, with place and cure
 
 
 def new_scenario(name: str, source: str, path: Path) -> Draft:
-    """Write a scenario for a kind of town or a map file to ``path``; a map that is no SUMO network is imported beside it.
+    """Write a scenario whose values suit a road network, and say what they are.
 
-    Raises HippodromeError, also if a file that it would write exists.
+    Args:
+        name: The scenario's name.
+        source: A kind of town to be generated, one of ``KINDS``, or a map's file. A map that is no SUMO network is imported
+            once: its network is written beside the scenario.
+        path: The scenario's file.
+
+    Raises:
+        HippodromeError: The source or the name cannot be used, or a file that would be written exists.
     """
     network = path.with_name(f"{path.stem}.net.xml.gz") if _is_imported(source) else None
     for target in filter(None, (path, network)):
@@ -94,7 +101,7 @@ def new_scenario(name: str, source: str, path: Path) -> Draft:
 
 
 def draft_for(town: Town) -> Draft:
-    """Lengths from the size of the part of the network that can be toured, rates from its speed limits."""
+    """Values that suit a town: lengths by the size of the part that can be toured, the frame rate by its speed limits."""
     network = town.network
     graph = tour_graph(network)
     drivable_m = float(graph.length_m.sum())
@@ -113,7 +120,7 @@ def draft_for(town: Town) -> Draft:
 
 
 def scenario_text(name: str, source: str, path: Path, draft: Draft) -> str:
-    """The file's text."""
+    """The text of the scenario's file, with comments."""
     return TEMPLATE.format(
         title=f"A generated town, {source}." if source in KINDS else f"The roads of {Path(source).name}.",
         file=path,
@@ -129,6 +136,7 @@ def scenario_text(name: str, source: str, path: Path, draft: Draft) -> str:
 
 
 def _town_line(source: str, path: Path) -> str:
+    """The line of the file that says where to drive."""
     if source in KINDS:
         return f"town: {_flow(_shipped_town(source))}"
     if _is_imported(source):
@@ -137,6 +145,7 @@ def _town_line(source: str, path: Path) -> str:
 
 
 def _tour_words(draft: Draft) -> str:
+    """The comment on the mapping tour: how much of the roads it sees."""
     share = min(1.0, 0.6 * draft.tour_m / (1e3 * draft.drivable_km))
     return f"40 % of it on roads driven before; of the {draft.drivable_km:.1f} km that can be driven it sees about {share:.0%}"
 
@@ -146,7 +155,10 @@ def _is_imported(source: str) -> bool:
 
 
 def _town(source: str, imported: Path | None, folder: Path) -> Town:
-    """The town to suit the values to. What is wrong with an imported network is said of the map that the user knows."""
+    """Build or read the town that the values have to suit, with ``folder`` for whatever has to be written.
+
+    ``imported`` is the network made of a foreign map; errors about it name the map, which the user knows.
+    """
     if source in KINDS:
         return build_town(TownSpec.model_validate(_shipped_town(source)), 1, folder)
     network = imported or located(Path(source), "--from")
@@ -161,7 +173,7 @@ def _town(source: str, imported: Path | None, folder: Path) -> Town:
 
 
 def _shipped_town(kind: str) -> dict[str, object]:
-    """The town of the scenario that comes with the package: one place where the sizes are chosen."""
+    """The town of the scenario of this kind that comes with the package, so that sizes are chosen in one place."""
     text = (files("hippodrome.scenarios") / "towns" / f"{kind}.yaml").read_text(encoding="utf-8")
     town: dict[str, object] = yaml.safe_load(text)["town"]
     return town
@@ -178,11 +190,12 @@ def _scalar(text: str) -> str:
 
 
 def _flow(values: dict[str, object]) -> str:
+    """A mapping as YAML in one line."""
     return yaml.safe_dump(values, default_flow_style=True, sort_keys=False, width=1000).strip()
 
 
 def _checked(trial: Path, path: Path) -> Scenario:
-    """What is written must load; only the name can be wrong."""
+    """Load what was written to ``trial``; only the name can be wrong. Errors speak of ``path``, where it will lie."""
     try:
         return load_yaml(trial, Scenario)
     except ScenarioError as error:

@@ -15,7 +15,7 @@ from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.yaml_file import ScenarioError, load_yaml
 
 UNKNOWN: Final = "extra_forbidden"  # pydantic's name for a key that the model does not have
-MODEL_TYPES: Final = ("model_type", "dataclass_type")  # and for a plain value where keys are wanted
+MODEL_TYPES: Final = ("model_type", "dataclass_type")  # pydantic's names for a plain value where a mapping is wanted
 
 
 def file_errors(path: Path) -> tuple[str, ...]:
@@ -44,11 +44,12 @@ def _invalid(root: yaml.Node | None, error: ValidationError) -> Iterator[tuple[i
         if isinstance(node, yaml.MappingNode) and one["type"] == "literal_error":
             continue  # a mapping was never meant to be one of the names: its own errors follow
         if one["type"] in MODEL_TYPES and place == "noise":
-            continue  # and a name was never meant to be a mapping
+            continue  # a name was never meant to be a mapping: the error about names follows
         yield line, f"{place}: {_reason(one, place)}".removeprefix(": ")
 
 
 def _reason(one: Mapping[str, Any], place: str) -> str:
+    """What is wrong with the value at ``place``, in our words where pydantic's would not help; ``one`` is its error."""
     if one["type"] == UNKNOWN:
         near = difflib.get_close_matches(place, _known(place), n=1, cutoff=0.6)
         return f"unknown key; {f'did you mean {near[0]}?' if near else 'docs/scenarios.md lists all'}"
@@ -64,14 +65,17 @@ def _reason(one: Mapping[str, Any], place: str) -> str:
 
 
 def _known(place: str) -> list[str]:
-    """The keys beside and below which an unknown one was written, ends of tables and tables alike."""
+    """All keys of the same depth as the unknown one, whether they hold a value or further keys."""
     depth = place.count(".") + 1
     names = (key.path for key in (*scenario_keys(), *noise_keys()))
     return sorted({".".join(path[:depth]) for path in names if len(path) >= depth})
 
 
 def _find(node: yaml.Node | None, location: Sequence[int | str]) -> tuple[int, str, yaml.Node | None]:
-    """Line, path and node of the deepest part of ``location`` that the file has; names of the model's types are skipped."""
+    """Line, dotted path and node of the deepest part of ``location`` that the file really has.
+
+    ``location`` is pydantic's; the names of the model's types that it may have in it are not in the file and are skipped.
+    """
     line, path = node.start_mark.line + 1 if node else 1, []
     for part in location:
         if isinstance(node, yaml.MappingNode):
@@ -87,7 +91,10 @@ def _find(node: yaml.Node | None, location: Sequence[int | str]) -> tuple[int, s
 
 
 def _repeated(node: yaml.Node | None, path: tuple[str, ...], seen: set[int]) -> Iterator[tuple[int, str]]:
-    """Keys given twice: YAML readers take the last one without a word. Aliases may lead back to a node ``seen`` before."""
+    """Line and words for each key that is given twice, of which YAML readers take the last one without a word.
+
+    Nodes in ``seen`` are left out: an alias may lead back to one of them.
+    """
     if not isinstance(node, yaml.MappingNode) or id(node) in seen:
         return
     seen.add(id(node))

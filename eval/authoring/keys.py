@@ -23,16 +23,17 @@ SIGNS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Key:
-    """One key: its path in the file, what it takes, what it is without being set, and what it means."""
+    """One key of a scenario."""
 
-    path: tuple[str, ...]
-    kind: str
-    default: Any
-    limits: str
+    path: tuple[str, ...]  # its place in the file, from the outermost key
+    kind: str  # what it takes, in words
+    default: Any  # its value where it is left out
+    limits: str  # limits of a number, in signs; empty: none
     meaning: str
 
     @property
     def name(self) -> str:
+        """The key as people write it, ``mapping.tour.length_m``."""
         return ".".join(self.path)
 
 
@@ -53,6 +54,12 @@ def is_model(kind: Any) -> bool:
     return isinstance(kind, type) and (issubclass(kind, BaseModel) or dataclasses.is_dataclass(kind))
 
 
+def models(model: type) -> tuple[type, ...]:
+    """The model itself and all models that its fields hold, each once."""
+    inner = [found for _, kind, _ in fields_of(model) if is_model(kind) for found in models(kind)]
+    return tuple(dict.fromkeys([model, *inner]))
+
+
 def meanings(model: type) -> dict[str, str]:
     """What each field means: its comment, or its entry in ``MEANINGS``."""
     return {name: comment or MEANINGS.get(f"{model.__name__}.{name}", "") for name, comment in comments(model).items()}
@@ -60,7 +67,9 @@ def meanings(model: type) -> dict[str, str]:
 
 @lru_cache(maxsize=256)
 def comments(model: type) -> dict[str, str]:
-    """What each field's comment says: the text after ``#`` on the lines of its declaration."""
+    """What each field's comment says: the text after ``#`` on the lines of its declaration. Inherited fields come first."""
+    parents = [parent for parent in model.__bases__ if dataclasses.is_dataclass(parent)]
+    inherited = {name: comment for parent in parents for name, comment in comments(parent).items()}
     lines, first = inspect.getsourcelines(model)
     source = inspect.cleandoc("".join(lines)) if lines[0].startswith(" ") else "".join(lines)
     words: dict[int, str] = {}
@@ -70,7 +79,7 @@ def comments(model: type) -> dict[str, str]:
     (body,) = ast.parse(source).body
     assert isinstance(body, ast.ClassDef), f"{model} at line {first}"
     fields = [node for node in body.body if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)]
-    return {
+    return inherited | {
         node.target.id: " ".join(filter(None, (words.get(line) for line in range(node.lineno, (node.end_lineno or 0) + 1))))
         for node in fields
         if isinstance(node.target, ast.Name)
@@ -99,7 +108,7 @@ def _keys(model: type, path: tuple[str, ...], defaults: Any) -> Iterator[Key]:
 
 
 def _inner_constraints(annotation: Any) -> tuple[Any, ...]:
-    """Of ``Annotated[float, Field(gt=0)] | None``: the constraints sit inside."""
+    """Constraints of the parts of a type: those of ``Annotated[float, Field(gt=0)] | None`` sit inside its first part."""
     inside = (getattr(part, "__metadata__", ()) for part in get_args(annotation))
     infos = [info for metadata in inside for info in metadata]
     return tuple(rule for info in infos for rule in getattr(info, "metadata", (info,)))
@@ -121,6 +130,7 @@ def _kind(annotation: Any) -> str:
 
 
 def _limits(constraints: tuple[Any, ...]) -> str:
+    """Constraints in signs: "> 0, ≤ 5"."""
     found = [
         f"{sign} {_plain(getattr(rule, name))}" for rule in constraints for name, sign in SIGNS.items() if hasattr(rule, name)
     ]
@@ -128,5 +138,5 @@ def _limits(constraints: tuple[Any, ...]) -> str:
 
 
 def _plain(limit: float) -> str:
-    """A limit without an exponent: as people write it."""
+    """A limit without an exponent, as people write it."""
     return f"{limit:,.0f}" if limit == int(limit) else f"{limit:g}"

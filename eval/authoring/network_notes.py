@@ -12,14 +12,15 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.types import Town
 
-SHOWN: Final = 3  # of a kind: an extract from OpenStreetMap may have hundreds, and one cure mends them all
-CURES: Final = {  # by the words of ``sim.network.check_network``
+SHOWN: Final = 3  # notes of one kind that are shown: an OpenStreetMap extract may have hundreds, and one cure mends them all
+CURES: Final = {  # what to do, by words in the notes of ``sim.network.check_network``
     "cannot be left or reached again": "to tour them, import a larger extract, or draw the way back in netedit",
     "zero-length lane": "nothing to do; `netconvert --junctions.join` removes most",
     "coincide at": "if one can drive across, join them: `netconvert --junctions.join`, or netedit",
     "wait for a hand": "nothing to do; a program of your own, drawn in netedit, is kept",
 }
-VIEW_GAP_M: Final = 4.0  # beyond, a view shows another place than the one before: the mapper's vertices are 5 m apart
+# Greatest way between two frames: beyond it a view shows another place than the one before, for vertices are 5 m apart.
+VIEW_GAP_M: Final = 4.0
 
 
 def network_notes(scenario: Scenario, town: Town) -> tuple[str, ...]:
@@ -33,7 +34,7 @@ def _cure(note: str) -> str:
 
 
 def _with_place(note: str, network: RoadNetwork) -> str:
-    """Coordinates behind the edge or lane that a note gives as its instance."""
+    """The note with coordinates put behind the edge or lane that it gives as an instance."""
     named = re.search(r"for instance ([^\s,)]+)", note)
     place_m = _middle_m(named.group(1), network) if named else None
     if named is None or place_m is None:
@@ -43,7 +44,7 @@ def _with_place(note: str, network: RoadNetwork) -> str:
 
 
 def _middle_m(name: str, network: RoadNetwork) -> tuple[float, float] | None:
-    """Halfway along an edge's first lane, or a lane."""
+    """The point halfway along a lane, or along an edge's first lane; None if the network has neither of that name."""
     if name in network.lane_ids:
         lane = network.lane_ids.index(name)
     elif name in network.edge_ids:
@@ -56,6 +57,7 @@ def _middle_m(name: str, network: RoadNetwork) -> tuple[float, float] | None:
 
 
 def _few_of_a_kind(notes: Sequence[str]) -> Iterator[str]:
+    """At most ``SHOWN`` notes with the same cure, and how many more there are."""
     kinds: dict[str, list[str]] = {}
     for note in notes:
         kinds.setdefault(_cure(note), []).append(note)
@@ -66,7 +68,7 @@ def _few_of_a_kind(notes: Sequence[str]) -> Iterator[str]:
 
 
 def _rate_notes(scenario: Scenario, network: RoadNetwork) -> Iterator[str]:
-    """Too few frames for the speed of the streets: the views of one drive then fall between those of the other."""
+    """A note if there are too few frames for the speed of the streets: views of one drive then fall between the other's."""
     speed_mps = float(np.median(network.speed_limit_mps[~network.is_internal]))
     gap_m = speed_mps / scenario.camera.rate_hz
     if gap_m > VIEW_GAP_M:

@@ -21,19 +21,19 @@ from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.scene.build import build_scene
 from hippodrome.sim.types import Drive, Town
 
-STILLS = 3  # of each drive: one row of six shows town, light and traffic
-LITTLE_OVERLAP = 0.9  # a localization drive is meant to stay on roads that the map has
+STILLS = 3  # frames of each drive: one row of six shows town, light and traffic
+LITTLE_OVERLAP = 0.9  # a note is given below this share of mapped roads: the second drive is meant to stay on the map
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Preview:
-    """What a scenario will be, as far as a quick look can tell."""
+    """What a scenario's drives will be, without mapping them."""
 
     town: Town
     drives: dict[Role, Drive]
     samples: dict[Role, Samples]
     town_notes: tuple[str, ...]  # what is odd about the network, where, and what to do
-    mapped_share: float  # of the localization drive's length: on directed edges that the mapping drive sees
+    mapped_share: float  # share of the localization drive's edges, by length, that the mapping drive goes along too
 
     def lines(self) -> list[str]:
         """Statistics for the terminal, one line each."""
@@ -45,13 +45,14 @@ class Preview:
         ]
 
     def notes(self) -> list[str]:
+        """What is odd about the network and the drives."""
         few = f"{1.0 - self.mapped_share:.0%} of the localization drive is on roads that the map will not have; " \
               "lengthen mapping.tour or shorten localization.tour"  # fmt: skip
         return [*self.town_notes, *([few] if self.mapped_share < LITTLE_OVERLAP else [])]
 
 
 def preview_scenario(scenario: Scenario, out: Path) -> Preview:
-    """Simulates both drives, draws ``overview.png`` and ``stills.png`` into ``out``. Raises HippodromeError."""
+    """Simulate both drives, and draw ``overview.png`` and ``stills.png`` into ``out``. Raises HippodromeError."""
     require_gl()
     plans = {role: RecordingPlan(scenario, role, out) for role in ROLES}
     town = plans["mapping"].town()
@@ -84,6 +85,7 @@ def mapped_share(network: RoadNetwork, mapping: Drive, second: Drive) -> float:
 
 
 def _stills(plans: dict[Role, RecordingPlan], town: Town, preview: Preview) -> tuple[list[Frame], list[str]]:
+    """``STILLS`` frames of each drive, spread evenly over it, and their captions."""
     frames, captions = [], []
     for role, plan in plans.items():
         samples, conditions = preview.samples[role], plan.drive_spec.conditions

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from hippodrome._files import write_atomically
 from hippodrome.eval.authoring.keys import Key, noise_keys, scenario_keys
-from hippodrome.proto.atomic import write_atomically
+from hippodrome.eval.results.markdown import table
 from hippodrome.sim.self_motion import NOISE_LEVELS
 
 BEGIN: Final = "<!-- tables: made from the models by `make docs` -->"
 END: Final = "<!-- end of tables -->"
-UNITS: Final = {
+UNITS: Final = {  # units by the ends of fields' names, longer ends first
     "nats_per_rad": "nats/rad",
     "deg_per_sqrt_s": "deg/√s", "rad_per_sqrt_s": "rad/√s", "per_sqrt_s": "1/√s", "per_sqrt_m": "1/√m", "per_metre": "1/m",
     "mps2": "m/s²", "radps": "rad/s", "degps": "deg/s", "mps": "m/s", "km": "km", "deg": "deg", "rad": "rad", "hz": "Hz",
@@ -40,25 +41,26 @@ def reference_markdown() -> str:
 
 
 def with_tables(text: str) -> str:
-    """A document with the part between the two marks made anew."""
+    """A document with the part between ``BEGIN`` and ``END`` made anew."""
     before, rest = text.split(BEGIN, maxsplit=1)
     _, after = rest.split(END, maxsplit=1)
     return f"{before}{BEGIN}\n\n{reference_markdown()}\n{END}{after}"
 
 
 def _table(keys: Sequence[Key]) -> str:
-    lines = ["| key | takes | default | unit | meaning |", "|---|---|---|---|---|"]
-    lines += [f"| `{key.name}` | {_takes(key)} | {_default(key)} | {_unit(key.path[-1])} | {key.meaning} |" for key in keys]
-    return "\n".join(lines)
+    """One row a key, in the order of the models."""
+    rows = [[f"`{key.name}`", _takes(key), _default(key), _unit(key.path[-1]), key.meaning] for key in keys]
+    return "\n".join(table(("key", "takes", "default", "unit", "meaning"), rows, align="left"))
 
 
 def _noise_table() -> str:
-    """The named levels beside one another."""
+    """One row a key, one column a named level."""
     levels = {name: level.model_dump() for name, level in NOISE_LEVELS.items()}
-    lines = [f"| key | {' | '.join(levels)} | unit | meaning |", "|---" * (len(levels) + 3) + "|"]
-    for key in noise_keys():
-        values = " | ".join(_value(level[key.path[-1]]) for level in levels.values())
-        lines.append(f"| `{key.name}` | {values} | {_unit(key.path[-1])} | {key.meaning} |")
+    rows = [
+        [f"`{key.name}`", *(_value(level[key.path[-1]]) for level in levels.values()), _unit(key.path[-1]), key.meaning]
+        for key in noise_keys()
+    ]
+    lines = table(["key", *levels, "unit", "meaning"], rows, align="left")
     words = "A level's name, or these figures; those left out have the default of `clean`."
     return f"## `noise`: errors of self-motion\n\n{words}\n\n" + "\n".join(lines) + "\n"
 
@@ -72,6 +74,7 @@ def _takes(key: Key) -> str:
 
 
 def _value(value: Any) -> str:
+    """A value as people write it in YAML."""
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -84,6 +87,7 @@ def _value(value: Any) -> str:
 
 
 def _unit(name: str) -> str:
+    """The unit that a field's name ends with; empty if it has none."""
     return next((unit for ending, unit in UNITS.items() if name.endswith(f"_{ending}")), "")
 
 

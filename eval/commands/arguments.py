@@ -1,35 +1,102 @@
-"""Arguments that several commands share, and the exit status of all."""
+"""What the commands have in common: the layout of their help, arguments that several of them take, and the exit status of all."""
 
 from __future__ import annotations
 
 import argparse
+import inspect
 import math
 import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, TypeAlias
 
 from hippodrome.core.types import StartPose
 from hippodrome.sim.renamed import present_value
 
 DONE, THRESHOLD_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
+Command: TypeAlias = Callable[[argparse.Namespace], int]  # takes the options and answers with the exit status
+
+
+class HelpLayout(argparse.HelpFormatter):
+    """Wraps each paragraph of a description by itself and leaves indented lines, which are commands to copy, as they are."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        wrap = super()._fill_text
+        return "\n\n".join(part if "\n  " in part else wrap(part, width, indent) for part in text.strip().split("\n\n"))
+
+
+def add_command(
+    commands: Any, name: str, run: Command, summary: str, description: str, examples: Sequence[str]
+) -> argparse.ArgumentParser:
+    """Add a command to a parser's sub-parsers.
+
+    Args:
+        commands: What ``add_subparsers`` returned.
+        name: The word that calls the command.
+        run: What it does; answers with the exit status.
+        summary: A few words for the list of commands.
+        description: What it does, what goes in and what comes out, in paragraphs.
+        examples: Command lines that work.
+    """
+    parser = _add_parser(commands, name, summary, description, examples)
+    parser.set_defaults(command=run)
+    return parser
+
+
+def add_group(commands: Any, name: str, summary: str, description: str, examples: Sequence[str]) -> Any:
+    """Add a command that has sub-commands, and answer with what these are added to. By itself it prints its help."""
+    parser = _add_parser(commands, name, summary, description, examples)
+    parser.set_defaults(command=print_help(parser))
+    return parser.add_subparsers(metavar="ACTION", title="actions")
+
+
+def _add_parser(commands: Any, name: str, summary: str, description: str, examples: Sequence[str]) -> argparse.ArgumentParser:
+    epilog = "\n  ".join(["examples:" if len(examples) > 1 else "example:", *examples])
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=summary, description=inspect.cleandoc(description), epilog=epilog, formatter_class=HelpLayout
+    )
+    return parser
+
+
+def print_help(parser: argparse.ArgumentParser) -> Command:
+    """The command that a parser with sub-commands runs when none is given: say what there is."""
+
+    def run(_: argparse.Namespace) -> int:
+        parser.print_help()
+        return BAD_INPUT
+
+    return run
+
 
 def add_scenarios(parser: argparse.ArgumentParser, several: bool) -> None:
     """The scenarios, and what may be replaced in them."""
-    parser.add_argument("scenarios", type=Path, nargs="+" if several else 1, metavar="SCENARIO.yaml", help="see scenarios/")
-    parser.add_argument("--network", type=Path, metavar="NET", help="drive in this SUMO network (.net.xml, .net.xml.gz) instead")
-    parser.add_argument("--seed", type=seed, metavar="N", help="replace the scenario's seed")
+    parser.add_argument(
+        "scenarios", type=Path, nargs="+" if several else 1, metavar="SCENARIO.yaml",
+        help="a scenario's file; `hippodrome scenario new` writes one, docs/scenarios.md lists its keys",
+    )  # fmt: skip
+    parser.add_argument(
+        "--network", type=Path, metavar="NET",
+        help="drive in this road network instead of the scenario's town: SUMO (.net.xml, .net.xml.gz), OpenStreetMap or "
+             "OpenDRIVE (default: the scenario's town)",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=seed, metavar="N", help="replace the scenario's seed (default: the scenario's own)")
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
     """How many processes; no result depends on it."""
     parser.add_argument(
-        "--workers", type=positive, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)"
-    )
+        "--workers", type=positive, default=os.cpu_count() or 1, metavar="N",
+        help="how many processes work at once; no result depends on it (default: one for each core)",
+    )  # fmt: skip
 
 
 def add_out(parser: argparse.ArgumentParser, default: str) -> None:
     """The folder of the results."""
-    parser.add_argument("--out", type=Path, default=Path(default), metavar="DIR", help=f"results go here (default: {default})")
+    parser.add_argument(
+        "--out", type=Path, default=Path(default), metavar="DIR",
+        help=f"folder for the results; what is finished in it is not made again (default: {default})",
+    )  # fmt: skip
 
 
 def positive(text: str) -> int:

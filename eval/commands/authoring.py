@@ -1,4 +1,4 @@
-"""The command line of ``hippodrome scenario``."""
+"""``hippodrome scenario``: write, check and preview scenarios."""
 
 from __future__ import annotations
 
@@ -7,38 +7,69 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
+from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, add_command, add_group
 
 
 def add_scenario_command(commands: Any) -> None:
-    """Adds ``scenario`` with its four subcommands to the parser's ``commands``."""
-    parser = commands.add_parser("scenario", help="write, check and preview scenarios", description=__doc__)
-    actions = parser.add_subparsers(required=True, metavar="ACTION")
+    """Adds ``scenario`` with its four sub-commands to the parser's ``commands``."""
+    actions = add_group(
+        commands, "scenario", "write, check and preview scenarios",
+        """Write, check and preview scenarios.
 
-    new = actions.add_parser("new", help="write a commented scenario for a road network", description=_new.__doc__)
-    new.add_argument("name", metavar="NAME")
-    new.add_argument("--from", dest="source", required=True, metavar="SOURCE",
-                     help="rural, grid, radial, random, or a .net.xml, .osm (also .gz, .pbf) or .xodr file")  # fmt: skip
-    new.add_argument("--out", type=Path, metavar="FILE", help="default: NAME.yaml")
-    new.set_defaults(command=_new)
+        A scenario is a YAML file that says where to drive, what is seen, how the two drives go, and which limits the figures must
+        keep. docs/authoring.md goes from a map to a scenario; docs/scenarios.md lists every key.""",
+        ["hippodrome scenario new my-town --from grid", "hippodrome scenario preview my-town.yaml"],
+    )  # fmt: skip
 
-    validate = actions.add_parser("validate", help="check scenarios and their networks", description=_validate.__doc__)
-    validate.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    validate.set_defaults(command=_validate)
+    new = add_command(
+        actions, "new", _new, "write a commented scenario for a road network",
+        """Write a commented scenario whose values suit a road network.
 
-    preview = actions.add_parser("preview", help="both drives and a few frames, in seconds", description=_preview.__doc__)
-    preview.add_argument("files", type=Path, nargs="+", metavar="FILE")
+        A map that is not SUMO's is imported once: its network is written beside the scenario, as NAME.net.xml.gz. What is odd
+        about the network is said with its place and what to do. Nothing that exists is overwritten.""",
+        ["hippodrome scenario new my-town --from my_town.osm",
+         "hippodrome scenario new my-grid --from grid --out scenarios/my-grid.yaml"],
+    )  # fmt: skip
+    new.add_argument("name", metavar="NAME", help="the scenario's name, under which its results are filed")
+    new.add_argument(
+        "--from", dest="source", required=True, metavar="SOURCE",
+        help="where to drive: a town to be generated (rural, grid, radial or random), or a map's file: SUMO (.net.xml, "
+             ".net.xml.gz), OpenStreetMap (.osm, .osm.gz, .osm.pbf) or OpenDRIVE (.xodr)",
+    )  # fmt: skip
+    new.add_argument("--out", type=Path, metavar="FILE", help="file for the scenario (default: NAME.yaml)")
+
+    validate = add_command(
+        actions, "validate", _validate, "check scenarios and their networks",
+        """Check the keys and values of scenarios, and whether their road networks can be driven.
+
+        Lists every error with file, line, key and cure, and what is odd about a network. Nothing is run or written. Exits with 2
+        if a file cannot be used.""",
+        ["hippodrome scenario validate my-town.yaml"],
+    )  # fmt: skip
+    validate.add_argument("files", type=Path, nargs="+", metavar="FILE", help="a scenario's file")
+
+    preview = add_command(
+        actions, "preview", _preview, "see both drives and a few frames, in seconds",
+        """Simulate both drives of each scenario, without mapping anything, and draw them.
+
+        Writes DIR/NAME/overview.png (the roads and both drives from above, and what is driven more than once) and
+        DIR/NAME/stills.png (a few frames of each drive), and prints how much of the roads is seen.""",
+        ["hippodrome scenario preview my-town.yaml"],
+    )  # fmt: skip
+    preview.add_argument("files", type=Path, nargs="+", metavar="FILE", help="a scenario's file")
     preview.add_argument(
-        "--out", type=Path, default=Path("out/preview"), metavar="DIR", help="pictures go to DIR/NAME (default: out/preview)"
-    )
-    preview.set_defaults(command=_preview)
+        "--out", type=Path, default=Path("out/preview"), metavar="DIR",
+        help="pictures go to DIR/NAME, with the scenario's name (default: out/preview)",
+    )  # fmt: skip
 
-    schema = actions.add_parser("schema", help="print the JSON schema of a scenario", description=_schema.__doc__)
-    schema.set_defaults(command=_schema)
+    add_command(
+        actions, "schema", _schema, "print the JSON schema of a scenario",
+        """Print the JSON schema of a scenario, with the meaning of each key. Editors complete and check with it.""",
+        ["hippodrome scenario schema > scenario.schema.json"],
+    )  # fmt: skip
 
 
 def _new(options: argparse.Namespace) -> int:
-    """Write a commented scenario whose values suit the road network."""
     from hippodrome.eval.authoring.draft import new_scenario
 
     path = options.out or Path(f"{options.name}.yaml")
@@ -51,7 +82,6 @@ def _new(options: argparse.Namespace) -> int:
 
 
 def _validate(options: argparse.Namespace) -> int:
-    """Check files, keys, values and road networks; names file, line and key. Exit status 2 if a file cannot be used."""
     from hippodrome.eval.authoring.check import check_scenario
 
     failed = False
@@ -68,7 +98,6 @@ def _validate(options: argparse.Namespace) -> int:
 
 
 def _preview(options: argparse.Namespace) -> int:
-    """Simulate both drives of each scenario, draw them from above and a few frames; prints statistics."""
     from hippodrome.eval.authoring.preview import preview_scenario
     from hippodrome.eval.files.scenarios import read_scenario
 
@@ -81,7 +110,6 @@ def _preview(options: argparse.Namespace) -> int:
 
 
 def _schema(_: argparse.Namespace) -> int:
-    """Print the JSON schema of a scenario; editors complete and check with it."""
     from hippodrome.eval.authoring.schema import schema_text
 
     print(schema_text())

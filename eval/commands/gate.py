@@ -1,4 +1,4 @@
-"""``hippodrome gate``: run scenarios with several seeds, hold them against their limits and against a committed baseline."""
+"""``hippodrome gate`` and ``compare``: hold a run against a committed baseline, or two runs against each other."""
 
 from __future__ import annotations
 
@@ -6,29 +6,59 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_out, add_workers
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_out, add_workers
 
 SEEDS = (1, 2, 3)
 
 
 def add_gate_commands(commands: Any) -> None:
     """Adds ``gate`` and ``compare`` to the parser's ``commands``."""
-    parser = commands.add_parser("gate", help="compare with a baseline over several seeds", description=_gate.__doc__)
-    parser.add_argument("scenarios", type=Path, nargs="*", metavar="SCENARIO.yaml")
-    parser.add_argument("--baseline", type=Path, default=Path("baseline.json"), metavar="FILE", help="default: baseline.json")
-    parser.add_argument("--seeds", type=_seeds, default=SEEDS, metavar="1,2,3", help="default: 1,2,3")
+    parser = add_command(
+        commands, "gate", _gate, "fail where this code is worse than a baseline",
+        """Run scenarios with several seeds and hold the figures against a baseline, a file that is committed beside the code.
+
+        Exits with 1 if a limit of a scenario does not hold, if a row fails or a drive is lost that was not before, or if an error
+        is worse than the baseline's and that is not chance: a paired test over scenarios and seeds decides. Prints what moved.
+        With --update the run becomes the baseline instead. docs/authoring.md says what the gate catches.""",
+        ["hippodrome gate my-town.yaml --update",
+         "hippodrome gate my-town.yaml --junit gate.xml",
+         "hippodrome gate --power --baseline scenarios/baseline.json"],
+    )  # fmt: skip
+    parser.add_argument(
+        "scenarios", type=Path, nargs="*", metavar="SCENARIO.yaml", help="a scenario's file; with --power none is needed"
+    )
+    parser.add_argument(
+        "--baseline", type=Path, default=Path("baseline.json"), metavar="FILE",
+        help="the file with the figures of earlier code (default: baseline.json)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seeds", type=_seeds, default=SEEDS, metavar="1,2,3",
+        help="seeds of the runs, with commas; more seeds catch smaller changes (default: 1,2,3)",
+    )  # fmt: skip
     parser.add_argument("--update", action="store_true", help="make this run the baseline instead of comparing with it")
-    parser.add_argument("--power", nargs="?", const="topometric", metavar="METHOD",
-                        help="run nothing: say what the gate would catch, on the figures of the baseline")  # fmt: skip
+    parser.add_argument(
+        "--power", nargs="?", const="topometric", metavar="METHOD",
+        help="run nothing: say how large a regression of this method the gate would catch, on the baseline's own figures "
+             "(without METHOD: topometric; default: the gate is run)",
+    )  # fmt: skip
     add_workers(parser)
     add_out(parser, "out/gate")
-    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the verdict as JUnit XML as well")
-    parser.set_defaults(command=_gate)
+    parser.add_argument(
+        "--junit",
+        type=Path,
+        metavar="FILE",
+        help="write the verdict as JUnit XML too, for CI systems (default: it is not written)",
+    )
 
-    pair = commands.add_parser("compare", help="two results side by side", description=_compare.__doc__)
-    pair.add_argument("before", type=Path, metavar="A", help="folder with results.json")
-    pair.add_argument("after", type=Path, metavar="B", help="folder with results.json")
-    pair.set_defaults(command=_compare)
+    pair = add_command(
+        commands, "compare", _compare, "show two results side by side",
+        """Print which figures of the results in B differ from those in A, and by how much. It is no test and gives no verdict.
+
+        Both are folders that `hippodrome eval` wrote. Results of different scenarios, drives or definitions are refused.""",
+        ["hippodrome compare out/before out/after"],
+    )  # fmt: skip
+    pair.add_argument("before", type=Path, metavar="A", help="folder with the first results.json")
+    pair.add_argument("after", type=Path, metavar="B", help="folder with the second results.json")
 
 
 def _seeds(text: str) -> tuple[int, ...]:
@@ -42,22 +72,20 @@ def _seeds(text: str) -> tuple[int, ...]:
 
 
 def _gate(options: argparse.Namespace) -> int:
-    """Fail (exit status 1) if a limit of a scenario does not hold, or a figure is worse than the baseline's and not by chance."""
     from rich.console import Console
 
     from hippodrome.eval.gate.baseline import read_baseline
     from hippodrome.eval.gate.power import print_power
-    from hippodrome.eval.gate.run import Request, gate
+    from hippodrome.eval.gate.run import GateRequest, gate
 
     if options.power is not None:
         print_power(read_baseline(options.baseline), options.power, Console())
         return DONE
     names = ("scenarios", "seeds", "baseline", "update", "workers", "out", "junit")
-    return DONE if gate(Request(**{name: getattr(options, name) for name in names})) else THRESHOLD_FAILED
+    return DONE if gate(GateRequest(**{name: getattr(options, name) for name in names})) else THRESHOLD_FAILED
 
 
 def _compare(options: argparse.Namespace) -> int:
-    """Print which figures of B differ from A's; results of different scenarios or metric definitions are refused."""
     from rich.console import Console
 
     from hippodrome.eval.gate.two_runs import compare_folders

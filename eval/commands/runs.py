@@ -1,4 +1,4 @@
-"""``hippodrome eval``, ``render`` and ``report``: the whole chain."""
+"""``hippodrome eval``, ``render`` and ``report``: the whole chain, its recordings alone, and its report alone."""
 
 from __future__ import annotations
 
@@ -6,37 +6,63 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_out, add_scenarios, add_workers
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_out, add_scenarios, add_workers
 
 
 def add_run_commands(commands: Any) -> None:
     """Adds them to the parser's ``commands``."""
-    evaluate = commands.add_parser("eval", help="run scenarios end to end and score them", description=_evaluate.__doc__)
+    evaluate = add_command(
+        commands, "eval", _evaluate, "run scenarios end to end and score them",
+        """Drive, render, map, refine, localize and score one or more scenarios.
+
+        For each scenario a town is generated or read, and two drives are simulated in it. A map is built from the first drive,
+        refined with the road network, and the second drive is localized in it. All methods are scored against the simulator's
+        truth.
+
+        Writes DIR/results.json (every figure with its definition), DIR/table1.md, DIR/report.html (one page that needs no
+        network) and, for each scenario, a folder with maps (.pbstream), trajectories (TUM) and figures (PNG).
+
+        Exits with 1 if a threshold of a scenario does not hold.""",
+        ["hippodrome eval scenarios/towns/rural.yaml --out out/rural",
+         "hippodrome eval my-town.yaml --network my_town.net.xml --seed 7 --workers 2"],
+    )  # fmt: skip
     add_scenarios(evaluate, several=True)
     add_workers(evaluate)
     add_out(evaluate, "out/eval")
-    evaluate.set_defaults(command=_evaluate)
 
-    render = commands.add_parser("render", help="make the recordings of a scenario only", description=_render.__doc__)
+    render = add_command(
+        commands, "render", _render, "make the recordings of a scenario only",
+        """Simulate and draw the two drives of one scenario, without mapping or scoring anything.
+
+        Writes two recordings, DIR/recordings/NAME-mapping-KEY and NAME-localization-KEY, each with its frames, the sensed
+        self-motion and the truth, and prints where they are. `hippodrome map` and `localize` read them. The town's network lies
+        in DIR/towns.""",
+        ["hippodrome render scenarios/towns/grid.yaml --out out/grid"],
+    )  # fmt: skip
     add_scenarios(render, several=False)
     add_workers(render)
     add_out(render, "out/render")
-    render.set_defaults(command=_render)
 
-    report = commands.add_parser("report", help="write DIR/report.html anew", description=_report.__doc__)
-    report.add_argument("results", type=Path, metavar="DIR", help="folder with results.json")
-    report.set_defaults(command=_report)
+    report = add_command(
+        commands, "report", _report, "write the report of a run anew",
+        """Make DIR/report.html anew from DIR/results.json and the files beside it, and print where it is.
+
+        The report is one page that needs no network: tables, figures, an interactive map, and the worst places with their
+        frames.""",
+        ["hippodrome report out/eval"],
+    )  # fmt: skip
+    report.add_argument(
+        "results", type=Path, metavar="DIR", help="the folder that `hippodrome eval` wrote, with results.json in it"
+    )
 
 
 def _evaluate(options: argparse.Namespace) -> int:
-    """Drive, render, map, refine, localize and score each scenario; writes DIR/results.json, tables and figures."""
     from hippodrome.eval.run import evaluate
 
     return DONE if evaluate(options.scenarios, options.network, options.seed, options.workers, options.out) else THRESHOLD_FAILED
 
 
 def _render(options: argparse.Namespace) -> int:
-    """Simulate and draw the mapping and the localization drive of one scenario, without evaluating them."""
     from hippodrome.eval.run import render
 
     render(options.scenarios, options.network, options.seed, options.workers, options.out)
@@ -44,7 +70,6 @@ def _render(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    """Make DIR/report.html from DIR/results.json and the files beside it."""
     from hippodrome.eval.report.report import write_report
 
     print(write_report(options.results))

@@ -1,4 +1,4 @@
-"""``hippodrome map``, ``refine`` and ``localize``: the stages alone, on files."""
+"""``hippodrome map``, ``refine`` and ``localize``: the stages of the chain alone, on files."""
 
 from __future__ import annotations
 
@@ -6,47 +6,80 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, refine_mode, start_pose
+from hippodrome.eval.commands.arguments import DONE, add_command, refine_mode, start_pose
 
 
 def add_stage_commands(commands: Any) -> None:
     """Adds them to the parser's ``commands``."""
-    build = commands.add_parser("map", help="build the semi-metric map of a recording", description=_map.__doc__)
-    build.add_argument("recording", type=Path, metavar="RECORDING", help="folder of a recording")
-    _settings(build, "mapper")
-    build.add_argument("--out", type=Path, required=True, metavar="MAP.pbstream")
-    build.set_defaults(command=_map)
+    build = add_command(
+        commands, "map", _map, "build the semi-metric map of a recording",
+        """Build the cognitive map of a recorded drive from its frames and its self-motion.
 
-    refine = commands.add_parser("refine", help="turn a semi-metric map topometric", description=_refine.__doc__)
-    refine.add_argument("map", type=Path, metavar="MAP.pbstream")
-    refine.add_argument("--network", type=Path, required=True, metavar="NET.net.xml[.gz]")
+        The map is semi-metric: right in its connections, in map units whose length in metres is unknown. Writes MAP.pbstream and
+        prints its size and the CPU time as a share of the drive's duration. `hippodrome refine` makes it metric.""",
+        ["hippodrome map out/grid/recordings/grid-mapping-* --out out/grid/semi.pbstream"],
+    )  # fmt: skip
+    build.add_argument(
+        "recording", type=Path, metavar="RECORDING", help="a recording's folder, made by `hippodrome render` or `import`"
+    )
+    _add_settings(build, "mapper")
+    build.add_argument("--out", type=Path, required=True, metavar="MAP.pbstream", help="file for the semi-metric map")
+
+    refine = add_command(
+        commands, "refine", _refine, "lay a semi-metric map on the roads of a network",
+        """Refine a semi-metric map with a road network, which makes it topometric: metric, in the network's frame.
+
+        Writes MAP.pbstream and prints the stretches that could not be matched to roads, each with its cause, and what was
+        estimated.""",
+        ["hippodrome refine out/grid/semi.pbstream --network out/grid/towns/*.net.xml --out out/grid/topo.pbstream",
+         "hippodrome refine semi.pbstream --network town.net.xml --mode paper --start 120.5,40,90 --out topo.pbstream"],
+    )  # fmt: skip
+    refine.add_argument("map", type=Path, metavar="MAP.pbstream", help="the semi-metric map, of `hippodrome map`")
     refine.add_argument(
-        "--mode", type=refine_mode, choices=["route", "paper"], default="route", help="route: unknown start; paper: Eqs. (8)-(12)"
+        "--network", type=Path, required=True, metavar="NET.net.xml[.gz]", help="the road network, in SUMO's format"
     )
     refine.add_argument(
-        "--start", type=start_pose, metavar="X,Y,HEADING", help="known start: metres, degrees (mode paper needs it)"
+        "--mode", type=refine_mode, choices=["route", "paper"], default="route",
+        help="route: search the route over the whole network, the start may be unknown; paper: the published equations (8)-(12), "
+             "from a known start (default: route; 'default', its former name, goes on working)",
+    )  # fmt: skip
+    refine.add_argument(
+        "--start", type=start_pose, metavar="X,Y,HEADING",
+        help="pose at the start of the drive, in the network's frame: metres, metres, degrees counter-clockwise from east "
+             "(default: unknown; --mode paper needs it)",
+    )  # fmt: skip
+    _add_settings(refine, "refinement")
+    refine.add_argument("--out", type=Path, required=True, metavar="MAP.pbstream", help="file for the topometric map")
+
+    localize = add_command(
+        commands, "localize", _localize, "localize a recorded drive in a topometric map",
+        """Localize a recorded drive in a topometric map, from an unknown start.
+
+        Writes the poses of the steps at which the localizer declares to know where it is, as a TUM trajectory
+        (`t x y z qx qy qz qw`; seconds and metres, in the network's frame), and prints how many they are.""",
+        ["hippodrome localize out/grid/topo.pbstream out/grid/recordings/grid-localization-* --out out/grid/drive.tum",
+         "hippodrome localize topo.pbstream recordings/monday --network town.net.xml --out monday.tum"],
+    )  # fmt: skip
+    localize.add_argument("map", type=Path, metavar="MAP.pbstream", help="the topometric map, of `hippodrome refine`")
+    localize.add_argument(
+        "recording", type=Path, metavar="RECORDING", help="a recording's folder, made by `hippodrome render` or `import`"
     )
-    _settings(refine, "refinement")
-    refine.add_argument("--out", type=Path, required=True, metavar="MAP.pbstream")
-    refine.set_defaults(command=_refine)
-
-    localize = commands.add_parser(
-        "localize", help="localize a recorded drive in a topometric map", description=_localize.__doc__
-    )
-    localize.add_argument("map", type=Path, metavar="MAP.pbstream")
-    localize.add_argument("recording", type=Path, metavar="RECORDING", help="folder of a recording")
-    localize.add_argument("--network", type=Path, metavar="NET.net.xml[.gz]", help="lanes to pull the estimate to")
-    _settings(localize, "localizer")
-    localize.add_argument("--out", type=Path, required=True, metavar="TRAJECTORY.tum")
-    localize.set_defaults(command=_localize)
+    localize.add_argument(
+        "--network", type=Path, metavar="NET.net.xml[.gz]",
+        help="the road network, whose lanes the estimate is drawn to (default: localize by the map alone)",
+    )  # fmt: skip
+    _add_settings(localize, "localizer")
+    localize.add_argument("--out", type=Path, required=True, metavar="TRAJECTORY.tum", help="file for the trajectory")
 
 
-def _settings(parser: argparse.ArgumentParser, part: str) -> None:
-    parser.add_argument("--scenario", type=Path, metavar="SCENARIO.yaml", help=f"take the {part}'s settings from this scenario")
+def _add_settings(parser: argparse.ArgumentParser, part: str) -> None:
+    parser.add_argument(
+        "--scenario", type=Path, metavar="SCENARIO.yaml",
+        help=f"take the {part}'s settings from this scenario (default: those of docs/scenarios.md)",
+    )  # fmt: skip
 
 
 def _map(options: argparse.Namespace) -> int:
-    """Build the semi-metric cognitive map of a recording from its frames and self-motion."""
     from hippodrome.eval.methods.stages import map_files
 
     map_files(options.recording, options.scenario, options.out)
@@ -54,7 +87,6 @@ def _map(options: argparse.Namespace) -> int:
 
 
 def _refine(options: argparse.Namespace) -> int:
-    """Constrain a semi-metric map with a road network (RC-HMM)."""
     from hippodrome.eval.methods.stages import refine_files
 
     refine_files(options.map, options.network, options.mode, options.start, options.scenario, options.out)
@@ -62,7 +94,6 @@ def _refine(options: argparse.Namespace) -> int:
 
 
 def _localize(options: argparse.Namespace) -> int:
-    """Localize a recorded drive in a topometric map from an unknown start; writes a TUM trajectory of the localized stretches."""
     from hippodrome.eval.methods.stages import localize_files
 
     localize_files(options.map, options.recording, options.network, options.scenario, options.out)

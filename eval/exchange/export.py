@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from importlib import import_module
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from hippodrome.eval.exchange.drives.exported import ExchangeError, ExportedDrive, gather_drives
+from hippodrome.eval.exchange.drives.exported import ExportedDrive, gather_drives
+from hippodrome.eval.exchange.drives.folder import new_folder
+from hippodrome.eval.exchange.extra import optional_module
 
 # Format -> module below ``formats``. Those with packages of the extra are imported only when they are asked for.
 FORMATS: Final = {
@@ -25,12 +23,21 @@ FORMATS: Final = {
     "rosbag2": "rosbag2_folder",
 }
 ABOUT: Final = "about.json"
-EXTRA_PACKAGES: Final = ("evo", "foxglove_schemas_protobuf", "mcap", "mcap_protobuf", "rerun", "rosbags")
 
 
 def export(folder: Path, to: str, network: Path | None, out: Path) -> None:
-    """Write everything below ``folder`` as format ``to`` into the new folder ``out``."""
-    writer = format_module(f"hippodrome.eval.exchange.formats.{FORMATS[to]}")
+    """Write all drives below ``folder`` in another tool's format, and say what was written.
+
+    Args:
+        folder: A recording, the results of a scenario, or those of a whole run.
+        to: A key of ``FORMATS``.
+        network: The road network's file, where it does not lie beside the results.
+        out: A folder that does not exist yet. ``about.json`` in it says what is where, in which frames and units.
+
+    Raises:
+        HippodromeError: The folder has nothing to export, or ``out`` cannot be written; then nothing is left.
+    """
+    writer = optional_module(f"hippodrome.eval.exchange.formats.{FORMATS[to]}")
     drives = gather_drives(folder, network)
     with new_folder(out) as building:
         writer.write(drives, building)
@@ -42,38 +49,6 @@ def export(folder: Path, to: str, network: Path | None, out: Path) -> None:
     for drive in drives:
         if drive.network is None:
             print(f"note: {drive.name}: its road network was not found and is left out; name it with --network")
-
-
-def format_module(name: str) -> Any:
-    """A module that may need packages of the extra. Raises ExchangeError that names it."""
-    try:
-        return import_module(name)
-    except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] not in EXTRA_PACKAGES:
-            raise
-        raise ExchangeError(
-            f"the package '{(error.name or '').split('.')[0]}' is missing; install the extra: pip install 'hippodrome[exchange]'"
-        ) from None
-
-
-@contextmanager
-def new_folder(out: Path) -> Iterator[Path]:
-    """A folder to fill, which takes the name ``out`` when all is there. Nothing that exists is touched."""
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise ExchangeError(f"{out}: exists already; remove it or choose another --out")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        building = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".part", dir=out.parent))
-    except OSError as error:
-        raise ExchangeError(f"{out}: cannot be written: {error.strerror}") from None
-    try:
-        yield building
-        building.chmod(0o755)
-        building.replace(out)
-    except OSError as error:
-        raise ExchangeError(f"{out}: cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(building, ignore_errors=True)
 
 
 def _about(to: str, conventions: Sequence[str], drives: Sequence[ExportedDrive]) -> dict[str, Any]:

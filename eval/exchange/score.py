@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from hippodrome.core.types import HippodromeError, Trajectory
-from hippodrome.eval.exchange.drives.exported import ExchangeError, truth_of
+from hippodrome.eval.exchange.drives.errors import ExchangeError
+from hippodrome.eval.exchange.drives.exported import truth_of
 from hippodrome.eval.files.trajectories import read_tum
 from hippodrome.eval.methods.materials import RPE_DELTA_M
 from hippodrome.eval.metrics.alignment import AlignmentName
@@ -17,7 +18,16 @@ MIN_COVERAGE = 0.5  # foreign truth often begins late or ends early; how much wa
 
 
 def score_files(estimate: Path, recording: Path, network_frame: bool) -> None:
-    """Print APE and RPE with their definitions. ``network_frame``: whether a TUM estimate is in the network's frame."""
+    """Print APE and RPE of an estimate with their definitions.
+
+    Args:
+        estimate: A map (.pbstream) or a TUM trajectory.
+        recording: The recording whose truth it is held against.
+        network_frame: Whether a TUM trajectory is given in the truth's frame, so that it needs no alignment.
+
+    Raises:
+        HippodromeError: A file cannot be read, the recording has no truth, or too little of it was estimated.
+    """
     drive = open_recording(recording)
     if (truth := truth_of(drive)) is None:
         raise ExchangeError(f"{recording}: this drive was imported without truth, so there is nothing to score with")

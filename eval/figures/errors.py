@@ -16,7 +16,14 @@ VIOLIN_GRID = 200
 
 
 def draw_error_profiles(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, Score], title: str = "") -> None:
-    """APE above, RPE below, one line a method over the time of the drive; earlier ones wider, so that none hides."""
+    """APE above, RPE below, one line per method over the time of the drive. Earlier methods have wider lines, so that none hides.
+
+    Args:
+        path: The picture.
+        ape: Score by label of the method, in the order of the colours.
+        rpe: The same for the RPE.
+        title: Stands above the figure.
+    """
     figure = new_figure(9.0, 5.6)
     panels = figure.subplots(2, 1, sharex=True)
     for axes, scores, name in zip(panels, (ape, rpe), ("APE", "RPE"), strict=True):
@@ -32,7 +39,10 @@ def draw_error_profiles(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, 
 
 
 def draw_error_violins(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, Score], title: str = "") -> None:
-    """Distribution of APE and RPE per method on a logarithmic axis: median (bar), quartiles (box), mean (diamond)."""
+    """Distribution of APE and RPE per method on a logarithmic axis, with median (bar), quartiles (box) and mean (diamond).
+
+    Arguments are those of ``draw_error_profiles``.
+    """
     methods = max(len(ape), len(rpe), 1)
     figure = new_figure(2.4 + 2.2 * methods, 4.4)
     for axes, scores, name in zip(figure.subplots(1, 2), (ape, rpe), ("APE", "RPE"), strict=True):
@@ -46,7 +56,7 @@ def draw_error_violins(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, S
 
 
 def _violin(axes: Axes, place: int, errors_m: FloatArray, colour: str) -> None:
-    """A kernel density of log10 error, so that the shape is true on the logarithmic axis."""
+    """One violin. The density is that of the errors' logarithms, so that its shape is right on the logarithmic axis."""
     logs = np.log10(np.maximum(errors_m, FLOOR_M))
     levels, density = _density(logs)
     half_width = 0.38 * density / density.max()
@@ -59,7 +69,7 @@ def _violin(axes: Axes, place: int, errors_m: FloatArray, colour: str) -> None:
 
 
 def _density(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Gaussian kernel density (levels, density) with Silverman's bandwidth, floored at 2 % of a decade."""
+    """Levels, and the density there, by Gaussian kernels with Silverman's bandwidth, but at least 2 % of a decade."""
     width = max(1.06 * float(logs.std()) * len(logs) ** -0.2, 0.02)
     levels = np.linspace(logs.min() - 2.0 * width, logs.max() + 2.0 * width, VIOLIN_GRID)
     histogram, edges = np.histogram(logs, bins=VIOLIN_GRID)
@@ -69,4 +79,5 @@ def _density(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _together(scores: Mapping[str, Score]) -> Any:
+    """All errors of all methods."""
     return np.concatenate([score.errors_m for score in scores.values()]) if scores else np.zeros(0)

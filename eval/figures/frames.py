@@ -15,7 +15,7 @@ CAPTION_PX = 14  # above each row
 
 
 def draw_contact_sheet(path: Path, frames: Sequence[Frame], captions: Sequence[str], columns: int = 6, title: str = "") -> None:
-    """Frames of one size in rows of ``columns``, each with a caption above it."""
+    """Frames of one size in rows of ``columns``, each with a caption above it. Raises ValueError without frames or captions."""
     if not frames or len(frames) != len(captions):
         raise ValueError(f"{len(frames)} frames and {len(captions)} captions: one each, at least one")
     sheet, corners = _mosaic(frames, columns)

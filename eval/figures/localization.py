@@ -1,4 +1,4 @@
-"""Localization: error over time with the localizer's own verdict, and the strip of Fig. 4 A-D, Li et al. 2025."""
+"""Localization: the error over time with the localizer's own verdict, and the strip of Fig. 4 A-D, Li et al. 2025."""
 
 from __future__ import annotations
 
@@ -26,15 +26,23 @@ from hippodrome.eval.figures.style import (
 )
 from hippodrome.eval.metrics.localization import FALSE_FIX_M, LocalizationScore
 
-SHEET_SIZE = 48
-RING_SIZE = 72
-PEAKED = 10.0  # times the mean: a network that has made up its mind
+SHEET_SIZE = 48  # cells of a drawn grid module along each axis
+RING_SIZE = 72  # cells of the drawn head-direction ring
+PEAKED = 10.0  # a sheet whose maximum is so many times its mean has one sharp peak, which is marked
 
 
 def draw_localization_error(
     path: Path, t_s: FloatArray, errors_m: FloatArray, localized: NDArray[np.bool_], title: str = ""
 ) -> None:
-    """Position error (N,) over time; bands show where the localizer declared itself localized, and where it was wrong."""
+    """Position error over time; bands show where the localizer declared itself localized, and where it was wrong.
+
+    Args:
+        path: The picture.
+        t_s: Times (N,).
+        errors_m: Errors (N,).
+        localized: Whether each step (N,) was declared localized.
+        title: Stands above the figure.
+    """
     figure = new_figure(9.0, 3.4)
     axes = figure.subplots()
     wrong = localized & (errors_m > FALSE_FIX_M)
@@ -54,7 +62,13 @@ def draw_localization_error(
 
 
 def draw_localization_comparison(path: Path, scores: Mapping[str, LocalizationScore], title: str = "") -> None:
-    """Position error of several methods over the same time, where each vouches for it; a mark at each one's first fix."""
+    """Position error of several methods over the same time, where each declared itself localized, with a mark at its first fix.
+
+    Args:
+        path: The picture.
+        scores: Score by label of the method, at least one.
+        title: Stands above the figure.
+    """
     figure = new_figure(9.0, 3.6)
     axes = figure.subplots()
     start_s = min(score.t_s[0] for score in scores.values())
@@ -72,7 +86,7 @@ def draw_localization_comparison(path: Path, scores: Mapping[str, LocalizationSc
 
 
 def strip_steps(t_s: FloatArray, columns: int = 8) -> list[int]:
-    """Indices of steps spread evenly on a logarithmic time axis, the first and the last among them."""
+    """Numbers of up to ``columns`` of the steps at ``t_s`` (N,), evenly on a logarithmic axis, with the first and the last."""
     elapsed = t_s - t_s[0]
     first = elapsed[1] if len(elapsed) > 1 else 0.0
     wanted = np.geomspace(max(first, 1e-3), max(elapsed[-1], 2e-3), columns - 1)
@@ -88,9 +102,18 @@ def draw_localization_strip(
     module: int = 0,
     title: str = "",
 ) -> None:
-    """Frames, grid-cell sheet and head-direction ring at the ``shown`` steps; below, the error (N,) of all steps.
+    """Frame, grid-cell sheet and head-direction ring at a few steps, and below them the error of all steps.
 
-    Time runs from the first step on a logarithmic axis, as in the paper: the settling happens in the first seconds.
+    Time runs from the first step on a logarithmic axis, as in the paper, as the estimate settles in the first seconds.
+
+    Args:
+        path: The picture.
+        frames: The frames of the steps that are shown.
+        shown: The estimates of the steps that are shown.
+        t_s: Times (N,) of all steps.
+        errors_m: Errors (N,) of all steps.
+        module: Which grid module is shown.
+        title: Stands above the figure.
     """
     columns = len(shown)
     figure = new_figure(1.45 * columns + 0.6, 6.2)
@@ -113,7 +136,7 @@ def draw_localization_strip(
 
 
 def grid_sheet(estimate: LocalizationEstimate, module: int) -> FloatArray:
-    """Activity (n, n) of one grid module: each population a von Mises bump on the torus, summed; flat while uninformed."""
+    """Activity (n, n) of one grid module: the sum of a von Mises bump on the torus per population, flat while uninformed."""
     angles = np.linspace(-np.pi, np.pi, SHEET_SIZE, endpoint=False)
     activity = np.zeros((SHEET_SIZE, SHEET_SIZE))
     for mean, reliability in zip(estimate.grid_phase_rad[module], estimate.grid_reliability[module], strict=True):
@@ -123,7 +146,7 @@ def grid_sheet(estimate: LocalizationEstimate, module: int) -> FloatArray:
 
 
 def head_ring(estimate: LocalizationEstimate) -> FloatArray:
-    """Activity (n,) of the head-direction ring, from -pi on."""
+    """Activity (n,) of the head-direction ring, beginning at -pi."""
     angles = np.linspace(-np.pi, np.pi, RING_SIZE, endpoint=False)
     pairs = zip(estimate.head_direction_rad, estimate.head_reliability, strict=True)
     activity: FloatArray = np.sum([_bump(angles, float(mean), float(reliability)) for mean, reliability in pairs], axis=0)
@@ -131,18 +154,18 @@ def head_ring(estimate: LocalizationEstimate) -> FloatArray:
 
 
 def _bump(angles: FloatArray, mean_rad: float, reliability: float) -> FloatArray:
-    """A von Mises density; for reliable populations ``reliability`` is 1/sigma^2, as in Eqs. (1)-(2), Li et al. 2025."""
+    """A von Mises density (n,); if it is narrow, ``reliability`` is 1/sigma^2, as in Eqs. (1)-(2), Li et al. 2025."""
     bump = np.exp(max(reliability, 0.0) * (np.cos(angles - mean_rad) - 1.0))
     density: FloatArray = bump / bump.sum()
     return density
 
 
 def _sheet(axes: Axes, activity: FloatArray) -> None:
-    """A sure network's bump is smaller than a cell of the sheet: a circle shows where it is."""
+    """Draw the activity of a grid module. A sharp peak may be smaller than a cell, so a circle shows where it is."""
     axes.imshow(activity.T, origin="lower", cmap="magma", vmin=0.0)
     if activity.max() > PEAKED * activity.mean():
         x, y = np.unravel_index(int(activity.argmax()), activity.shape)
-        axes.autoscale(False)  # a circle at the border is cut, the sheet stays as large as its neighbours
+        axes.autoscale(False)  # a circle at the border is cut off; otherwise the sheet would grow to hold it
         axes.scatter([x], [y], s=90, facecolors="none", edgecolors="white", linewidths=0.9)
 
 
@@ -151,7 +174,7 @@ def _ring(axes: Any, estimate: LocalizationEstimate) -> None:
     angles = np.linspace(-np.pi, np.pi, RING_SIZE, endpoint=False)
     axes.bar(angles, activity / activity.max(), width=2.0 * np.pi / RING_SIZE, bottom=1.2, color=BLUE, linewidth=0)
     axes.plot(np.linspace(-np.pi, np.pi, 90), np.full(90, 1.2), color=FAINT, linewidth=0.8)
-    if estimate.localized:  # before, the pose is but a beginning
+    if estimate.localized:  # before, the pose means nothing
         axes.plot([estimate.pose[2]] * 2, [0.0, 1.1], color=VERMILION, linewidth=1.5)
     axes.set_ylim(0.0, 2.3)
     axes.set_xticks([])
@@ -161,7 +184,7 @@ def _ring(axes: Any, estimate: LocalizationEstimate) -> None:
 
 def _log_time_error(axes: Axes, shown: Sequence[LocalizationEstimate], t_s: FloatArray, errors_m: FloatArray) -> None:
     elapsed = t_s - t_s[0]
-    start = max(elapsed[1] / 2.0 if len(elapsed) > 1 else 0.1, 1e-3)  # the first step sits at the axis' left end
+    start = max(elapsed[1] / 2.0 if len(elapsed) > 1 else 0.1, 1e-3)  # left end of the axis, where the first step is drawn
     axes.plot(np.maximum(elapsed, start), np.maximum(errors_m, FLOOR_M), color=TRUTH, linewidth=1.0)
     for estimate in shown:
         colour = GREEN if estimate.localized else FAINT
@@ -179,4 +202,4 @@ def _bands(axes: Axes, t_s: FloatArray, chosen: NDArray[np.bool_], colour: str, 
     changes = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
     for first, stop in changes.reshape(-1, 2):
         axes.axvspan(t_s[first], t_s[min(stop, len(t_s) - 1)], color=colour, alpha=alpha, linewidth=0, label=label)
-        label = "_"  # one entry in the legend
+        label = "_"  # keeps further runs out of the legend

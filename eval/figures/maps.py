@@ -28,20 +28,28 @@ from hippodrome.eval.figures.style import (
     save_figure,
 )
 
-DOT_SIZES = 5.5, 3.0  # points, of the first and the last map
-LEGEND_SIZE = 8.0  # points
-ERROR_RANGE_M = 0.05, 5.0  # of the colours, the same in every picture: methods, towns and days can be compared by eye
+DOT_SIZES = 5.5, 3.0  # of the first and the last map, in points
+LEGEND_SIZE = 8.0  # of the dots in the legend, in points
+ERROR_RANGE_M = 0.05, 5.0  # of the colours; the same in every picture, so that pictures can be compared by eye
 
 
 def draw_maps_over_truth(
     path: Path, network: RoadNetwork, truth_m: FloatArray, maps_m: Mapping[str, FloatArray], title: str = ""
 ) -> None:
-    """Vertices of each map (N, 2 or more columns) over the driven path, on the network in grey."""
+    """Vertices of several maps over the driven path, on the network in grey.
+
+    Args:
+        path: The picture.
+        network: The road network.
+        truth_m: The driven path (T, 2 or more columns).
+        maps_m: Positions (N, 2 or more columns) by label of the method, in the order of the colours.
+        title: Stands above the figure.
+    """
     figure = new_figure(7.2, 6.4)
     axes = figure.subplots()
     draw_network(axes, network)
     axes.plot(truth_m[:, 0], truth_m[:, 1], color=TRUTH, linewidth=0.9, label="ground truth", zorder=2.5)
-    sizes = np.linspace(*DOT_SIZES, len(maps_m))  # good maps lie on one another: the later ones leave a rim of the earlier
+    sizes = np.linspace(*DOT_SIZES, len(maps_m))  # good maps cover one another, so smaller dots of later ones leave a rim
     for (name, positions_m), colour, size in zip(maps_m.items(), SERIES, sizes, strict=False):
         axes.plot(positions_m[:, 0], positions_m[:, 1], ".", color=colour, markersize=size, alpha=0.8, label=name, zorder=3)
     axes.autoscale_view()
@@ -51,7 +59,7 @@ def draw_maps_over_truth(
 
 
 def draw_cognitive_map(path: Path, cognitive_map: CognitiveMap, title: str = "") -> None:
-    """Vertices, odometry edges and loop closures in the map's own frame (Fig. 3A)."""
+    """Vertices, odometry edges and loop closures of a map in its own frame (Fig. 3A)."""
     figure = new_figure(7.2, 6.4)
     axes = figure.subplots()
     unit = "m" if cognitive_map.frame == "network" else "map units"
@@ -76,7 +84,16 @@ def draw_cognitive_map(path: Path, cognitive_map: CognitiveMap, title: str = "")
 def draw_error_map(
     path: Path, network: RoadNetwork, positions_m: FloatArray, errors_m: FloatArray, title: str = "", label: str = "APE (m)"
 ) -> None:
-    """Positions (N, 2 or more columns) coloured by their error (N,) on one logarithmic scale for all (Fig. 3C)."""
+    """Positions coloured by their error, on a logarithmic scale that is the same in all pictures (Fig. 3C).
+
+    Args:
+        path: The picture.
+        network: The road network, drawn in grey.
+        positions_m: Positions (N, 2 or more columns).
+        errors_m: Errors (N,).
+        title: Stands above the figure.
+        label: Stands beside the scale.
+    """
     figure = new_figure(7.6, 6.4)
     axes = figure.subplots()
     draw_network(axes, network)
@@ -101,7 +118,7 @@ def draw_error_map(
 
 
 def _legend_below(figure: Any, axes: Axes) -> None:
-    """A legend outside the map, where it hides no road."""
+    """A legend below the map, where it hides no road."""
     legend = figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
     for handle in legend.get_lines():
-        handle.set_markersize(LEGEND_SIZE)  # however small the dots are in the map, their colour is to be told here
+        handle.set_markersize(LEGEND_SIZE)  # however small the dots are in the map, their colour must be seen here

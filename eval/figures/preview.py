@@ -11,14 +11,23 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
 from hippodrome.eval.figures.style import BLUE, GREEN, ORANGE, VERMILION, draw_network, new_figure, save_figure
 
-VISIT_COLOURS = (BLUE, GREEN, ORANGE)  # driven once, twice, more often
+VISIT_COLOURS = (BLUE, GREEN, ORANGE)  # of roads that are driven once, twice, more often
 VISIT_LABELS = ("mapping, once", "twice", "more often")
 
 
 def draw_preview(
     path: Path, network: RoadNetwork, mapping_m: FloatArray, visits: IntArray, second_m: FloatArray, title: str
 ) -> None:
-    """The mapping drive (N, 2 or more columns), coloured by how often its road is driven (N,), and the second drive."""
+    """The mapping drive, coloured by how often its road is driven, and the second drive.
+
+    Args:
+        path: The picture.
+        network: The road network, drawn in grey.
+        mapping_m: The mapping drive (N, 2 or more columns).
+        visits: How often the road of each of its steps (N,) is driven.
+        second_m: The second drive (M, 2 or more columns).
+        title: Stands above the figure.
+    """
     figure = new_figure(7.6, 7.0)
     axes = figure.subplots()
     draw_network(axes, network)

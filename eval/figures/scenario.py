@@ -11,70 +11,76 @@ from hippodrome.eval.figures.errors import draw_error_profiles, draw_error_violi
 from hippodrome.eval.figures.frames import draw_contact_sheet
 from hippodrome.eval.figures.localization import draw_localization_error, draw_localization_strip, strip_steps
 from hippodrome.eval.figures.maps import draw_cognitive_map, draw_error_map, draw_maps_over_truth
-from hippodrome.eval.methods.materials import (
-    Materials,
-    Scored,
-    Topometric,
-    file_stem,
-)
+from hippodrome.eval.methods.materials import Materials, ScoredTrajectory, TopometricResult
+from hippodrome.eval.methods.method import Method
 from hippodrome.eval.metrics.alignment import apply_to_positions, find_alignment
 from hippodrome.eval.metrics.association import associate
 from hippodrome.sim.recording import Recording
 
-CONTACT_FRAMES = 24  # four rows of six: enough to see a town, small enough to see a frame
+CONTACT_FRAMES = 24  # in four rows of six: enough frames to see the town, large enough to see what is in them
 
 
 def draw_scenario(
-    materials: Materials, semi_metric: CognitiveMap, scored: Mapping[str, Scored], found: Mapping[str, Topometric]
+    materials: Materials,
+    semi_metric: CognitiveMap,
+    scored: Mapping[Method, ScoredTrajectory],
+    topometric: Mapping[Method, TopometricResult],
 ) -> None:
-    """Maps over ground truth, errors along the drive, localization, frames."""
+    """Draw all pictures of an evaluation: frames, maps, errors along the drive, localization.
+
+    Args:
+        materials: What was evaluated.
+        semi_metric: The semi-metric map.
+        scored: Trajectories and errors of the methods that are shown.
+        topometric: The refined maps, and the second drive's localization in each.
+    """
     folder, name = materials.folder, materials.scenario.name
     frames, captions = _contact_sheet(materials.mapping)
     draw_contact_sheet(folder / "frames.png", frames, captions, title=f"{name}: the mapping drive as the camera sees it")
     draw_cognitive_map(folder / "semi-metric-map.png", semi_metric, f"{name}: semi-metric map, as built")
     draw_methods(materials, scored)
-    for method, one in found.items():
-        _draw_topometric(materials, method, one)
-    if found:
-        _draw_neurodynamics(materials, *list(found.items())[-1])
+    for method, result in topometric.items():
+        _draw_topometric(materials, method, result)
+    if topometric:
+        _draw_neurodynamics(materials, *list(topometric.items())[-1])
 
 
-def draw_methods(materials: Materials, scored: Mapping[str, Scored]) -> None:
-    """All methods beside one another: errors along the drive, their distribution, maps over ground truth."""
+def draw_methods(materials: Materials, scored: Mapping[Method, ScoredTrajectory]) -> None:
+    """Draw methods beside one another: errors along the drive, their distribution, maps over ground truth."""
     folder, name, truth = materials.folder, materials.scenario.name, materials.mapping.ground_truth()
-    absolute, relative = ({method: getattr(one, field) for method, one in scored.items()} for field in ("ape", "rpe"))
+    absolute, relative = ({method.label: getattr(one, field) for method, one in scored.items()} for field in ("ape", "rpe"))
     draw_error_profiles(folder / "errors.png", absolute, relative, f"{name}: errors along the drive")
     draw_error_violins(folder / "violins.png", absolute, relative, f"{name}: distribution of errors")
-    maps_m = {method: placed(one, truth) for method, one in scored.items()}
+    maps_m = {method.label: placed(one, truth) for method, one in scored.items()}
     draw_maps_over_truth(folder / "maps.png", materials.roads, truth.poses, maps_m, f"{name}: maps over ground truth")
 
 
-def placed(one: Scored, truth: Trajectory) -> FloatArray:
-    """Positions (V, 2) in the network frame, placed as they were for scoring."""
+def placed(one: ScoredTrajectory, truth: Trajectory) -> FloatArray:
+    """Positions (V, 2) of a trajectory in the network's frame, placed as they were for its APE."""
     pairs = associate(one.trajectory, truth)
     transform = find_alignment(one.alignment, pairs.estimate, pairs.reference)
     return apply_to_positions(transform, one.trajectory.poses[:, :2])
 
 
-def _draw_topometric(materials: Materials, method: str, one: Topometric) -> None:
+def _draw_topometric(materials: Materials, method: Method, result: TopometricResult) -> None:
     """APE on the map, and the second drive's error."""
-    name, path = materials.scenario.name, materials.folder / file_stem(method)
-    errors_m, localized = one.scored.ape.errors_m, one.localized
-    draw_error_map(path.with_name(f"{path.name}-ape.png"), materials.roads, one.scored.trajectory.poses, errors_m,
-                   f"{name}: {method}, APE on the map")  # fmt: skip
-    draw_localization_error(path.with_name(f"{path.name}-localization.png"), localized.t_s, localized.errors_m,
-                            localized.localized, f"{name}: localization in the map '{method}'")  # fmt: skip
+    name, folder = materials.scenario.name, materials.folder
+    scored, localized = result.scored, result.localized
+    draw_error_map(folder / f"{method.stem}-ape.png", materials.roads, scored.trajectory.poses, scored.ape.errors_m,
+                   f"{name}: {method.label}, APE on the map")  # fmt: skip
+    draw_localization_error(folder / f"{method.stem}-localization.png", localized.t_s, localized.errors_m,
+                            localized.localized, f"{name}: localization in the map '{method.label}'")  # fmt: skip
 
 
-def _draw_neurodynamics(materials: Materials, method: str, one: Topometric) -> None:
+def _draw_neurodynamics(materials: Materials, method: Method, result: TopometricResult) -> None:
     """Frames, grid cells, head direction and error while the estimate settles (the paper's Fig. 4 A-D)."""
-    name, path, localized = materials.scenario.name, materials.folder / "neurodynamics.png", one.localized
+    name, path, localized = materials.scenario.name, materials.folder / "neurodynamics.png", result.localized
     samples = materials.drive.samples
     steps = samples.frame_steps[strip_steps(samples.t_s[samples.frame_steps])]
     frames = [materials.drive.frame(int(samples.frame[step])) for step in steps]
-    shown = [one.localization.estimates[step] for step in steps]
+    shown = [result.localization.estimates[step] for step in steps]
     draw_localization_strip(path, frames, shown, localized.t_s, localized.errors_m,
-                            title=f"{name}: localization in the map '{method}' from an unknown start")  # fmt: skip
+                            title=f"{name}: localization in the map '{method.label}' from an unknown start")  # fmt: skip
 
 
 def _contact_sheet(recording: Recording) -> tuple[list[Frame], list[str]]:

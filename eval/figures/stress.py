@@ -11,8 +11,13 @@ from hippodrome.eval.figures.style import BLUE, VERMILION, log_errors, new_figur
 
 
 def draw_stress(path: Path, apes_m: Mapping[str, Sequence[float | None]]) -> None:
-    """A column of dots per case, one dot a run (mean APE of its map), a bar at their mean; runs in which nothing is
-    vouched for, as it must be where the drive never was, counted above.
+    """One column per case, with a dot per run at the mean APE of its map and a bar at the mean of the runs.
+
+    Above each column stands in how many runs the refinement vouched for nothing, as it must where the drive never was.
+
+    Args:
+        path: The picture.
+        apes_m: Mean APE of each run by name of the case, None where the refinement vouched for nothing.
     """
     figure = new_figure(1.2 + 1.15 * len(apes_m), 4.6)
     axes = figure.subplots()

@@ -1,4 +1,7 @@
-"""One look for all figures: Okabe and Ito's colours (told apart by colour-blind readers), no global state, the same bytes."""
+"""One style for all figures. Colours are Okabe and Ito's, which colour-blind readers can tell apart.
+
+No figure uses matplotlib's global state, and the same data give the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -11,31 +14,31 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from hippodrome._files import write_atomically
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.proto.atomic import write_atomically
 
 Axes: TypeAlias = Any  # matplotlib ships no types
 
 ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
     "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7",
 )  # fmt: skip
-VIOLET = "#5b3a9e"  # where they have black, which is the truth's here
+VIOLET = "#5b3a9e"  # in place of their black, which shows the truth here
 TRUTH, ROAD, FAINT = "#222222", "#c8c8c8", "#777777"
-SERIES: Final = (VERMILION, BLUE, GREEN, PURPLE, ORANGE, SKY, VIOLET)  # in the order in which methods are given
-ERROR_MAP: Final = "viridis_r"  # large errors dark: on white they must not fade
+SERIES: Final = (VERMILION, BLUE, GREEN, PURPLE, ORANGE, SKY, VIOLET)  # of methods, in the order in which they are given
+ERROR_MAP: Final = "viridis_r"  # large errors are dark, as they must stand out on white
 DPI = 130
-FLOOR_M = 0.01  # logarithmic error axes begin at a centimetre
+FLOOR_M = 0.01  # where logarithmic error axes begin
 
 
 def new_figure(width_in: float, height_in: float) -> Any:
-    """An empty figure that belongs to no display and no global list."""
+    """An empty figure that belongs to no display and not to matplotlib's global list of figures."""
     figure = Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def save_figure(figure: Any, path: Path) -> None:
-    """Write a PNG atomically, without date or program version in it."""
+    """Write a figure as PNG, atomically, without date or program version in it."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
     write_atomically(path, buffer.getvalue())
@@ -54,7 +57,7 @@ def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
 
 
 def log_errors(axes: Axes, errors_m: np.ndarray[Any, Any]) -> None:
-    """A logarithmic error axis with plain numbers, from a centimetre to beyond the largest error."""
+    """A logarithmic error axis with plain numbers, from ``FLOOR_M`` to the power of ten above the largest error."""
     top = max(float(np.max(errors_m, initial=1.0)), 1.0)
     axes.set_yscale("log")
     axes.set_ylim(FLOOR_M, 10.0 ** np.ceil(np.log10(top)))
@@ -69,7 +72,7 @@ def draw_network(axes: Axes, network: RoadNetwork) -> None:
 
 
 def frame_map(axes: Axes, x_label: str, y_label: str) -> None:
-    """A map's axes: equal scales around all that was drawn."""
+    """Axes of a map, with equal scales around all that was drawn."""
     axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale_view()
     tidy(axes, x_label, y_label)

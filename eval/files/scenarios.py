@@ -1,20 +1,30 @@
-"""Scenario files as every command reads them: the model of ``sim.scenario``, with networks found in installed packages too."""
+"""Scenario files as every command reads them: as ``sim.scenario`` does, but networks may also lie in installed packages."""
 
 from __future__ import annotations
 
+import json
 from importlib.util import find_spec
 from pathlib import Path
 from sysconfig import get_path
-from typing import Final
+from typing import Any, Final
 
 from hippodrome.sim.scenario import Scenario, load_scenario
 from hippodrome.sim.yaml_file import ScenarioError
 
-PACKAGE: Final = "package:"  # package:sumo/tools/game/bs3d/bs.net.xml: a file that a Python package brings along
+PACKAGE: Final = "package:"  # package:sumo/tools/game/bs3d/bs.net.xml is a file that an installed Python package has
 
 
 def read_scenario(path: Path, network: Path | None = None, seed: int | None = None) -> Scenario:
-    """The scenario in ``path``; ``network`` and ``seed`` replace its own. Raises HippodromeError."""
+    """The scenario in a file.
+
+    Args:
+        path: The file.
+        network: Road network that replaces the scenario's own.
+        seed: Seed that replaces the scenario's own.
+
+    Raises:
+        HippodromeError: The file or its network cannot be used.
+    """
     scenario = load_scenario(path, network, seed)
     named = scenario.town.network
     if named is None:
@@ -24,7 +34,15 @@ def read_scenario(path: Path, network: Path | None = None, seed: int | None = No
 
 
 def located(network: Path, where: str) -> Path:
-    """A network's file; of ``package:PACKAGE/FILE`` that of the installed package. Errors begin with ``where`` it is named."""
+    """The file of a road network, which for ``package:PACKAGE/FILE`` lies in an installed package.
+
+    Args:
+        network: The path as it is written.
+        where: Where it is written, for errors.
+
+    Raises:
+        ScenarioError: The package is not installed, or has no such file.
+    """
     start = next((i for i, part in enumerate(network.parts) if part.startswith(PACKAGE)), None)
     if start is None:
         return network
@@ -43,15 +61,23 @@ def located(network: Path, where: str) -> Path:
 
 
 def portable(network: Path) -> str:
-    """How results name a network so that they do not depend on the machine: ``package:...``, else the file's name."""
+    """The name of a network in results, which must not depend on the machine: ``package:...``, or else the file's name."""
     for site in map(Path, {get_path("purelib"), get_path("platlib")}):
         if network.is_relative_to(site):
             return f"{PACKAGE}{network.relative_to(site).as_posix()}"
     return network.name
 
 
+def effective_configuration(scenario: Scenario) -> dict[str, Any]:
+    """All values of a scenario, defaults included, as plain data for JSON. A network is named as ``portable`` does."""
+    values: dict[str, Any] = json.loads(scenario.model_dump_json())  # JSON has no infinity: such a limit becomes null
+    if scenario.town.network is not None:
+        values["town"]["network"] = portable(scenario.town.network)
+    return values
+
+
 def _package_folder(package: str) -> Path | None:
-    """Where a top-level package lies; it is not imported."""
+    """The folder of an installed top-level package, which is not imported; None if there is none."""
     try:
         spec = find_spec(package) if package.isidentifier() else None
     except (ImportError, ValueError):

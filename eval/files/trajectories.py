@@ -1,4 +1,4 @@
-"""Trajectories as TUM text: ``t x y z qx qy qz qw`` a line, what evo and most SLAM systems read. Planar: z = 0, yaw only."""
+"""Trajectories as TUM text, which evo and most SLAM systems read: ``t x y z qx qy qz qw`` per line, with z = 0 and yaw only."""
 
 from __future__ import annotations
 
@@ -6,16 +6,20 @@ from pathlib import Path
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.metrics.association import TrajectoryError, check_trajectory
-from hippodrome.proto.atomic import write_atomically
 
 MAX_BYTES = 256 << 20  # about two million poses
 COLUMNS = 8
 
 
 def write_tum(path: Path, trajectory: Trajectory) -> None:
-    """Write a trajectory; every number reads back exactly, but for the rounding of the heading's half angle."""
+    """Write a trajectory. Every number is read back exactly, except that the heading is rounded by way of a quaternion.
+
+    Raises:
+        TrajectoryError: It is no trajectory.
+    """
     check_trajectory(trajectory, str(path))
     half = trajectory.poses[:, 2] / 2.0
     rows = zip(trajectory.t_s, trajectory.poses[:, 0], trajectory.poses[:, 1], np.sin(half), np.cos(half), strict=True)
@@ -24,7 +28,7 @@ def write_tum(path: Path, trajectory: Trajectory) -> None:
 
 
 def read_tum(path: Path) -> Trajectory:
-    """Read a trajectory; z, roll and pitch are dropped."""
+    """Read a trajectory; z, roll and pitch are dropped. Raises TrajectoryError, which names the file and the line."""
     try:
         if (size := path.stat().st_size) > MAX_BYTES:
             raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")

@@ -1,4 +1,4 @@
-"""The baseline of the gate: the figures of earlier code, one cell for each scenario, seed and method."""
+"""The baseline of the gate: the figures of earlier code, one row for each scenario, seed and method."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.results.model import (
     ErrorSummary,
@@ -17,11 +18,9 @@ from hippodrome.eval.results.model import (
     ScenarioResult,
     to_json,
 )
-from hippodrome.proto.atomic import write_atomically
+from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
 
 FORMAT: Final = 1
-# Not part of what is asked, but of how it is answered: a change there is what the gate is for.
-ANSWERS: Final = ("mapper", "refine", "localizer", "thresholds", "description")
 
 
 class GateError(HippodromeError):
@@ -39,12 +38,12 @@ class Figure(_Model):
     definition: str
 
 
-class Cell(_Model):
+class BaselineRow(_Model):
     """What one method made of one scenario with one seed."""
 
     scenario: str
     seed: int
-    question: str  # hash of everything that the method has to answer
+    question: str  # hash of everything that the figures depend on except the code, see ``question_of``
     method: str
     failed: bool
     localized: bool | None  # None: the method does not localize
@@ -52,24 +51,25 @@ class Cell(_Model):
 
     @property
     def key(self) -> tuple[str, int, str]:
+        """What tells the row from all others."""
         return self.scenario, self.seed, self.method
 
 
 class Baseline(_Model):
-    """A committed file."""
+    """The file that is committed beside the code."""
 
     format: int = FORMAT
-    cells: tuple[Cell, ...]
+    cells: tuple[BaselineRow, ...]  # the rows, under the name that the file gives them
 
 
 def baseline_of(runs: list[Results]) -> Baseline:
-    """The cells of the measured rows of several runs, sorted."""
-    cells = [_cell(result, row) for run in runs for result in run.scenarios for row in result.rows if not row.quoted]
+    """The baseline that several runs make: all their rows that were measured, none that are quoted; sorted."""
+    cells = [_row(result, row) for run in runs for result in run.scenarios for row in result.rows if not row.quoted]
     return Baseline(cells=tuple(sorted(cells, key=lambda cell: cell.key)))
 
 
 def write_baseline(path: Path, baseline: Baseline) -> None:
-    """Write atomically; the same cells give the same bytes, and a changed figure one changed line."""
+    """Write the file. The same rows give the same bytes, and a changed figure changes one line."""
     write_atomically(path, to_json(baseline.model_dump(), str(path)).encode())
 
 
@@ -93,15 +93,19 @@ def read_baseline(path: Path) -> Baseline:
 
 
 def question_of(result: ScenarioResult) -> str:
-    """Hash of what is asked: town, drives, camera, noise, and what came of them. Constants of the algorithms are not in it."""
+    """Hash of what the methods are asked: town, drives, camera and noise, and how many frames came of them.
+
+    Constants of the algorithms are not in it: a change there is what the gate is for. Figures of different questions must not be
+    compared.
+    """
     configuration: dict[str, Any] = getattr(result, "configuration", None) or {}
-    asked = {key: value for key, value in configuration.items() if key not in ANSWERS}
+    asked = {key: value for key, value in configuration.items() if key not in DRIVE_INDEPENDENT_KEYS}
     driven = [result.network.edges, round(result.network.km, 3), result.frames]  # a file's name does not say what is in it
     return hashlib.sha256(json.dumps([asked, driven], sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _cell(result: ScenarioResult, row: Row) -> Cell:
-    return Cell(
+def _row(result: ScenarioResult, row: Row) -> BaselineRow:
+    return BaselineRow(
         scenario=result.name,
         seed=result.seed,
         question=question_of(result),

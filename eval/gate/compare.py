@@ -4,37 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from scipy.stats import t as student_t
 
-from hippodrome.eval.gate.baseline import Baseline, Cell, GateError
+from hippodrome.eval.gate.baseline import Baseline, BaselineRow, GateError
 
 ALPHA: Final = 0.01  # chance of failing a build that is no worse, over all figures together: one in a hundred pull requests
 TOLERANCE: Final = 0.03  # a mean change below this is not worth anybody's morning, however certain
 REPEATABILITY: Final = 0.01  # least standard deviation of a pair's ratio: other processors and drivers round differently
 FLOOR_M: Final = 0.01  # errors below a centimetre count as one: their ratios mean nothing
 MIN_PAIRS: Final = 3  # fewer say nothing about chance
-JUMP_RATIO: Final = 2.0  # a single pair that is this much worse fails by itself: one outlier widens the test's own error bar
-JUMP_M: Final = 0.5  # and by this much: below, a doubled error is still inside the lane
+# A single pair whose error grows by this factor and by this length fails by itself, for one outlier widens the test's own error
+# bar. A doubled error below this length is still inside the lane.
+JUMP_RATIO: Final = 2.0
+JUMP_M: Final = 0.5
 
-Key = tuple[str, int, str]
+Key: TypeAlias = tuple[str, int, str]  # scenario, seed, method
+Pair: TypeAlias = tuple[str, float, float]  # scenario and seed in words, error before, error after
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One figure of one method over all its pairs."""
+    """One figure of one method, over all pairs of a run's row and the baseline's row of the same scenario and seed."""
 
     method: str
     figure: str
     pairs: int
-    before: float  # geometric means
-    after: float
-    moved: bool  # in any pair
-    p_worse: float  # of a change this bad by chance, corrected for the number of figures
-    regressed: bool
-    worst: str  # the pair that changed most for the worse
+    before: float  # geometric mean over the pairs, in the baseline
+    after: float  # geometric mean over the pairs, in the run
+    moved: bool  # whether any pair differs at all
+    p_worse: float  # probability of a change at least this bad by chance, corrected for the number of figures that moved
+    regressed: bool  # whether it fails the build
+    worst: str  # the pair that changed most for the worse, in words
 
     @property
     def ratio(self) -> float:
@@ -43,7 +46,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """All that moved, and what was lost outright."""
+    """What the comparison of a run with a baseline came to."""
 
     changes: tuple[Change, ...]
     lost: tuple[str, ...]  # rows that fail now, drives that are no longer localized, single errors that more than doubled
@@ -63,8 +66,8 @@ def compare(run: Baseline, baseline: Baseline) -> Verdict:
     return Verdict(tuple(changes), (*lost_cells(now, then), *_jumps(now, then, proven)))
 
 
-def require_comparable(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> None:
-    """Raise GateError unless both hold the same cells, of the same scenarios and definitions."""
+def require_comparable(now: Mapping[Key, BaselineRow], then: Mapping[Key, BaselineRow]) -> None:
+    """Raise GateError unless both hold the same rows, and rows of the same question and the same definitions."""
     if missing := sorted(set(then) - set(now)):
         raise GateError(f"the run lacks {_place(missing[0])} of the baseline; run the same scenarios and seeds, or --update")
     if extra := sorted(set(now) - set(then)):
@@ -79,15 +82,13 @@ def require_comparable(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> Non
 
 
 def _place(key: Key) -> str:
+    """A row in words."""
     scenario, seed, method = key
     return f"'{scenario}', seed {seed}, '{method}'"
 
 
-Pair = tuple[str, float, float]  # where, before, after
-
-
-def _pairs(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> dict[tuple[str, str], list[Pair]]:
-    """Per method and figure: every scenario and seed in which both have it."""
+def _pairs(now: Mapping[Key, BaselineRow], then: Mapping[Key, BaselineRow]) -> dict[tuple[str, str], list[Pair]]:
+    """The pairs of each method and figure: one for every scenario and seed in which both have the figure."""
     pairs: dict[tuple[str, str], list[Pair]] = {}
     for (scenario, seed, method), cell in sorted(now.items()):
         before = then[scenario, seed, method].figures
@@ -98,7 +99,10 @@ def _pairs(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> dict[tuple[str,
 
 
 def _test(method: str, figure: str, pairs: Sequence[Pair]) -> Change:
-    """One-sided paired t-test on the logarithms of the ratios: a change in per cent, equal for small and large errors."""
+    """One figure's change by a one-sided paired t-test. The verdict on it needs all figures, see ``_judged``.
+
+    The test is on the logarithms of the ratios: what counts is the change in per cent, for small errors as for large ones.
+    """
     if len(pairs) < MIN_PAIRS:
         raise GateError(f"'{method}', {figure}: {len(pairs)} pair(s), the test needs {MIN_PAIRS}; give more seeds or scenarios")
     before, after = (np.array([pair[side] for pair in pairs]) for side in (1, 2))
@@ -113,7 +117,7 @@ def _test(method: str, figure: str, pairs: Sequence[Pair]) -> Change:
 
 
 def _judged(tests: Sequence[Change]) -> list[Change]:
-    """Holm's correction for the number of figures that moved at all, and the verdict on each. In the order given.
+    """The changes, in the order given, with Holm's correction for the number of figures that moved, and the verdict on each.
 
     Runs are deterministic: a figure that the change does not reach stays the same to the last digit, and is no chance to err.
     """
@@ -128,8 +132,8 @@ def _judged(tests: Sequence[Change]) -> list[Change]:
     ]
 
 
-def lost_cells(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> list[str]:
-    """What no mean shows: rows that fail now and did not, drives that were localized and are not."""
+def lost_cells(now: Mapping[Key, BaselineRow], then: Mapping[Key, BaselineRow]) -> list[str]:
+    """What no mean shows, in words: rows that fail now and did not, drives that were localized and are not."""
     lost = []
     for key in sorted(now):
         if now[key].failed and not then[key].failed:
@@ -139,8 +143,11 @@ def lost_cells(now: Mapping[Key, Cell], then: Mapping[Key, Cell]) -> list[str]:
     return lost
 
 
-def _jumps(now: Mapping[Key, Cell], then: Mapping[Key, Cell], proven: Collection[tuple[str, str]]) -> list[str]:
-    """Single figures that are so much worse that no mean is needed; those whose mean fails anyway are not told twice."""
+def _jumps(now: Mapping[Key, BaselineRow], then: Mapping[Key, BaselineRow], proven: Collection[tuple[str, str]]) -> list[str]:
+    """Single figures that are so much worse that no mean is needed, in words.
+
+    ``proven``: methods and figures whose mean fails anyway, which are not told twice.
+    """
     pairs = [(key, name, then[key].figures[name].value, figure.value) for key in sorted(now)
              for name, figure in sorted(now[key].figures.items()) if name in then[key].figures]  # fmt: skip
     return [

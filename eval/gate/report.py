@@ -10,9 +10,11 @@ from rich.console import Console
 from rich.table import Table
 
 from hippodrome.eval.gate.compare import Change, Verdict
+from hippodrome.eval.results.markdown import escaped
+from hippodrome.eval.results.markdown import table as markdown_table
 
-SHOWN = 12  # reasons on the terminal: who broke everything needs no list of it
-MOVED = 0.005  # half a per cent: below, a figure stands still
+SHOWN = 12  # reasons shown on the terminal: who broke everything needs no list of it
+MOVED = 0.005  # a figure that changes by less than this share stands still
 
 
 def print_verdict(verdict: Verdict, limits: Sequence[str], console: Console) -> None:
@@ -54,11 +56,10 @@ HEADS = ("method", "figure", "before", "after", "change", "p", "verdict", "worst
 
 def summary_markdown(verdict: Verdict, limits: Sequence[str]) -> str:
     """For ``$GITHUB_STEP_SUMMARY``."""
-    lines = [f"### Gate {'passed' if verdict.passed and not limits else 'failed'}", "", f"| {' | '.join(HEADS)} |",
-             f"|{'---|' * len(HEADS)}"]  # fmt: skip
-    lines += [f"| {' | '.join(_escaped(cell) for cell in _cells(change))} |" for change in verdict.changes]
-    lines += ["", *(f"- {_escaped(line)}" for line in (*verdict.lost, *limits))]
-    return "\n".join(lines) + "\n"
+    title = f"### Gate {'passed' if verdict.passed and not limits else 'failed'}"
+    rows = [[escaped(cell, html=True) for cell in _cells(change)] for change in verdict.changes]
+    reasons = [f"- {escaped(line, html=True)}" for line in (*verdict.lost, *limits)]
+    return "\n".join([title, "", *markdown_table(HEADS, rows, align="left"), "", *reasons]) + "\n"
 
 
 def junit_xml(verdict: Verdict, limits: Sequence[str]) -> bytes:
@@ -81,11 +82,13 @@ def junit_xml(verdict: Verdict, limits: Sequence[str]) -> bytes:
 
 
 def _cells(change: Change) -> tuple[str, ...]:
+    """The cells below ``HEADS``."""
     return (change.method, change.figure, f"{change.before:.3g}", f"{change.after:.3g}", _percent(change),
             f"{change.p_worse:.2g}", _word(change), change.worst)  # fmt: skip
 
 
 def _word(change: Change) -> str:
+    """The verdict in a word; only WORSE fails the build."""
     if change.regressed:
         return "WORSE"
     if abs(change.ratio - 1.0) <= MOVED:
@@ -94,13 +97,10 @@ def _word(change: Change) -> str:
 
 
 def _percent(change: Change) -> str:
+    """The change in per cent or, where it is many times over, as a factor."""
     return f"{100.0 * (change.ratio - 1.0):+.1f} %" if change.ratio < 10.0 else f"x {change.ratio:.0f}"
 
 
-def _escaped(text: str) -> str:
-    return text.replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")
-
-
 def _xml(text: str) -> str:
-    """Without the control characters that XML cannot hold."""
+    """Text without the control characters that XML cannot hold."""
     return "".join(character if character.isprintable() else " " for character in text)

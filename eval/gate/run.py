@@ -9,33 +9,36 @@ from pathlib import Path
 
 from rich.console import Console
 
+from hippodrome._files import write_atomically
 from hippodrome.eval.gate.baseline import Baseline, GateError, baseline_of, read_baseline, write_baseline
 from hippodrome.eval.gate.compare import MIN_PAIRS, Verdict, compare
 from hippodrome.eval.gate.report import junit_xml, print_verdict, summary_markdown
 from hippodrome.eval.results.model import Results
 from hippodrome.eval.results.thresholds import failed_limits
 from hippodrome.eval.run import load_scenarios, run_scenarios
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.scenario import Thresholds
 
 SUMMARY = "GITHUB_STEP_SUMMARY"  # where GitHub Actions wants Markdown
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class GateRequest:
     """What the command line asks for."""
 
     scenarios: Sequence[Path]
     seeds: Sequence[int]
     baseline: Path
-    update: bool
+    update: bool  # make the run the baseline instead of comparing with it
     workers: int
     out: Path
-    junit: Path | None
+    junit: Path | None  # where the verdict goes as JUnit XML too
 
 
-def gate(request: Request) -> bool:
-    """Whether the run is as good as the baseline and within all limits; with ``update`` it becomes the baseline."""
+def gate(request: GateRequest) -> bool:
+    """Run the scenarios with all seeds; whether the run is as good as the baseline and within all limits.
+
+    With ``update`` the run becomes the baseline, and passes. Raises HippodromeError on bad input.
+    """
     if not request.scenarios:
         raise GateError("no scenario: name one or more files")
     if len(request.scenarios) * len(request.seeds) < MIN_PAIRS:
@@ -77,7 +80,7 @@ def say(verdict: Verdict, limits: Sequence[str], junit: Path | None) -> bool:
 
 
 def broken_limits(runs: Sequence[Results]) -> list[str]:
-    """The scenarios' own limits that do not hold."""
+    """The scenarios' own limits that do not hold, in words."""
     return [
         f"{result.name}, seed {result.seed}: {line}"
         for run in runs
@@ -86,6 +89,6 @@ def broken_limits(runs: Sequence[Results]) -> list[str]:
     ]
 
 
-def _run(request: Request, seed: int) -> Results:
+def _run(request: GateRequest, seed: int) -> Results:
     """One seed; recordings that are there already are not made again, everything after them is."""
     return run_scenarios(load_scenarios(request.scenarios, None, seed), request.workers, request.out / f"seed-{seed}")

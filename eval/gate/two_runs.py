@@ -1,4 +1,4 @@
-"""``hippodrome compare A B``: two results side by side, cell by cell. No test, no verdict: that is the gate's."""
+"""``hippodrome compare A B``: two results side by side, figure by figure. No test and no verdict: those are the gate's."""
 
 from __future__ import annotations
 
@@ -27,14 +27,17 @@ class Difference:
 
     @property
     def share(self) -> float:
-        """Of the first value; infinite where that was zero and is no longer."""
+        """The change as a share of the first value; infinite where that was zero and the second is not."""
         if self.before == 0.0:
             return 0.0 if self.after == 0.0 else float("inf")
         return self.after / self.before - 1.0
 
 
 def differences(before: Results, after: Results) -> list[Difference]:
-    """Every figure that both runs have, in the order of scenarios, seeds and methods. Raises GateError if they do not compare."""
+    """Every figure that both runs have, in the order of scenarios, seeds and methods.
+
+    Raises GateError if they hold different scenarios, drives or definitions.
+    """
     then, now = ({cell.key: cell for cell in baseline_of([one]).cells} for one in (before, after))
     require_comparable(now, then)
     return [

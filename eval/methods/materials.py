@@ -1,16 +1,19 @@
-"""What one evaluation starts from, and what it finds on the way to rows and pictures."""
+"""What one evaluation starts from, and what it learns about each method on the way to rows and pictures."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Final
 
 import numpy as np
 
 from hippodrome.core.refinement.refine import RefineConfig
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import Refinement, Trajectory
+from hippodrome.core.types import Refinement, StartPose, Trajectory
+from hippodrome.eval.files.scenarios import effective_configuration
+from hippodrome.eval.methods.method import Method, RefineMode
 from hippodrome.eval.methods.stages import Localization
 from hippodrome.eval.metrics.alignment import AlignmentName
 from hippodrome.eval.metrics.localization import LocalizationScore
@@ -21,27 +24,33 @@ from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.survey import with_survey_error
 from hippodrome.sim.types import Town
 
-RPE_DELTA_M = 20.0  # the paper's 9.4 m for its semi-metric map fits a delta of about this
+RPE_DELTA_M: Final = 20.0  # the paper does not say its own; with about this, its semi-metric map would have the 9.4 m it prints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Materials:
-    """The inputs of one evaluation."""
+    """The inputs of one evaluation, and the folder that its files go to."""
 
     scenario: Scenario
     folder: Path
     town: Town
-    roads: RoadNetwork  # as surveyed: what the refinement and the localizer are given
-    mapping: Recording
-    drive: Recording  # to localize
+    roads: RoadNetwork  # the network as surveyed, which the refinement and the localizer are given
+    mapping: Recording  # the drive that the map is made of
+    drive: Recording  # the second drive, which is localized in the map
 
     @property
     def duration_s(self) -> float:
+        """Duration of the mapping drive."""
         return float(self.mapping.samples.t_s[-1])
+
+    def provenance(self, method: Method) -> dict[str, str]:
+        """What a map file says about how it was made."""
+        configuration = json.dumps(effective_configuration(self.scenario), sort_keys=True)
+        return {"method": method.label, "scenario": configuration, "recording": self.mapping.folder.name}
 
 
 def gather(scenario: Scenario, out: Path) -> Materials:
-    """The finished recordings of a scenario below ``out``, and its road network as surveyed."""
+    """The finished recordings of a scenario below ``out``, and its road network as surveyed. Makes the scenario's folder."""
     mapping, drive = RecordingPlan(scenario, "mapping", out), RecordingPlan(scenario, "localization", out)
     town = mapping.town()
     rng = np.random.default_rng([scenario.seed, 2])
@@ -51,10 +60,20 @@ def gather(scenario: Scenario, out: Path) -> Materials:
     return Materials(scenario, folder, town, roads, finish(mapping), finish(drive))
 
 
-def refine_config(scenario: Scenario, mode: Literal["route", "paper"], survey_error_m: float | None = None) -> RefineConfig:
-    """The scenario's refinement in one mode, told how accurate the road network is: surveyors state that, no drive can show it.
+def true_start(drive: Recording) -> StartPose:
+    """Where a drive really began, for methods that are told."""
+    return StartPose(*(float(value) for value in drive.ground_truth().poses[0]))
 
-    ``survey_error_m``: of the network that is given, where it is not the scenario's own. A value set in the scenario stands.
+
+def refine_config(scenario: Scenario, mode: RefineMode, survey_error_m: float | None = None) -> RefineConfig:
+    """The scenario's configuration of the refinement in one mode, told how accurate the road network is.
+
+    Surveyors state the accuracy of their networks, and no drive can reveal it. A value that the scenario sets itself stands.
+
+    Args:
+        scenario: Where the configuration is from.
+        mode: Mode of the refinement.
+        survey_error_m: Standard deviation of the error of the network that is given, if it is not the scenario's own network.
     """
     config = scenario.refine
     if survey_error_m is None:
@@ -65,36 +84,34 @@ def refine_config(scenario: Scenario, mode: Literal["route", "paper"], survey_er
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scored:
-    """A method's trajectory and its errors. A method without a metric frame is placed at the drive's start, not scaled."""
+class ScoredTrajectory:
+    """A method's trajectory and its errors."""
 
     trajectory: Trajectory
-    alignment: AlignmentName  # of the APE
+    alignment: AlignmentName  # how the trajectory was laid over the truth for its APE
     ape: Score
-    rpe: Score  # consecutive vertices
-    rpe_20m: Score
+    rpe: Score  # between consecutive samples
+    rpe_20m: Score  # between samples ``RPE_DELTA_M`` apart
 
 
-def score_trajectory(trajectory: Trajectory, truth: Trajectory, metric: bool) -> Scored:
-    """APE (no alignment at all if ``metric``, at the start if not) and RPE of a trajectory."""
-    alignment: AlignmentName = "none" if metric else "start"
-    return Scored(
+def score_trajectory(trajectory: Trajectory, truth: Trajectory, alignment: AlignmentName) -> ScoredTrajectory:
+    """APE and both RPEs of a trajectory. ``Method.alignment`` is how a method's trajectory is aligned.
+
+    Raises:
+        HippodromeError: The truth covers too little of the trajectory, or no two samples are ``RPE_DELTA_M`` apart.
+    """
+    return ScoredTrajectory(
         trajectory, alignment, ape(trajectory, truth, alignment), rpe(trajectory, truth), rpe(trajectory, truth, RPE_DELTA_M)
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Topometric:
-    """What one refinement mode gave, and how a second drive fared in its map."""
+class TopometricResult:
+    """What one mode of the refinement gave, and how the second drive was localized in its map."""
 
     refinement: Refinement
-    scored: Scored
+    scored: ScoredTrajectory
     map_bytes: int
-    cpu_s: float
+    cpu_s: float  # of the refinement
     localization: Localization
     localized: LocalizationScore
-
-
-def file_stem(method: str) -> str:
-    """A method's name as a file name: ``topometric (paper)`` becomes ``topometric-paper``."""
-    return method.replace(" (", "-").replace(")", "").replace(",", "").replace(" ", "-")

@@ -1,90 +1,73 @@
-"""The stages of an evaluation, each alone and on files: map, refine, localize.
+"""The stages of an evaluation, each alone: map, refine, localize. The first half times them, the second runs them on files.
 
-CPU times are this process's, around the algorithms only: decoding frames is the simulator's part.
+Times are CPU seconds of this process, around the algorithms only: decoding frames is the simulator's part and is not counted.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
-from typing import Literal, Protocol, TypeVar
+from typing import ParamSpec, Protocol, TypeVar
 
 import numpy as np
 
 from hippodrome.core import se2
-from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
-from hippodrome.core.mapping.mapper import Mapper, MapperConfig
-from hippodrome.core.refinement.refine import RefineConfig, refine
-from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import (
-    CognitiveMap,
-    FloatArray,
-    HippodromeError,
-    LocalizationEstimate,
-    Observation,
-    Refinement,
-    StartPose,
-    Trajectory,
-)
+from hippodrome.core.localization.localizer import Localizer
+from hippodrome.core.mapping.mapper import Mapper
+from hippodrome.core.refinement.refine import refine
+from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, Observation, StartPose, Trajectory
 from hippodrome.eval.files.scenarios import located
 from hippodrome.eval.files.trajectories import write_tum
+from hippodrome.eval.methods.method import RefineMode
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.network import read_network
 from hippodrome.sim.recording import open_recording
 from hippodrome.sim.scenario import Scenario, load_scenario
 
 MapT_co = TypeVar("MapT_co", covariant=True)
-
-
-@dataclass(frozen=True, slots=True)
-class Localization:
-    """Estimates after every observation, and the compute time that each step took."""
-
-    estimates: list[LocalizationEstimate]
-    step_s: FloatArray  # (N,) process CPU time
+ResultT = TypeVar("ResultT")
+ArgumentsP = ParamSpec("ArgumentsP")
 
 
 class MapBuilder(Protocol[MapT_co]):
-    """What takes observations one by one and then has a map."""
+    """What takes observations one by one and then has a map: the mapper, and its rivals."""
 
     def step(self, observation: Observation, /) -> object: ...
 
     def finish(self) -> MapT_co: ...
 
 
-def map_recording(observations: Iterable[Observation], config: MapperConfig) -> tuple[CognitiveMap, float]:
-    """The semi-metric map and the CPU seconds that it took."""
-    return built(Mapper(config), observations)
+@dataclass(frozen=True, slots=True)
+class Localization:
+    """The localizer's estimates, one after every observation, and the CPU time that each step took."""
+
+    estimates: list[LocalizationEstimate]
+    step_s: FloatArray  # (N,)
+
+    def declared(self) -> Trajectory | None:
+        """The poses of the steps that the localizer declared localized; None if there are none."""
+        known = [estimate for estimate in self.estimates if estimate.localized]
+        if not known:
+            return None
+        return Trajectory(np.array([e.t_s for e in known]), np.stack([e.pose for e in known]))
 
 
-def built(builder: MapBuilder[MapT_co], observations: Iterable[Observation]) -> tuple[MapT_co, float]:
-    """The builder's map and the CPU seconds that it took."""
+def map_recording(observations: Iterable[Observation], builder: MapBuilder[MapT_co]) -> tuple[MapT_co, float]:
+    """The map that ``builder`` makes of a drive, and the CPU seconds that it took."""
     cpu_s = 0.0
     for observation in observations:
         began = process_time()
         builder.step(observation)
         cpu_s += process_time() - began
-    began = process_time()
-    finished = builder.finish()
-    return finished, cpu_s + process_time() - began
+    finished, finishing_s = timed(builder.finish)
+    return finished, cpu_s + finishing_s
 
 
-def refine_map(
-    cognitive_map: CognitiveMap, network: RoadNetwork, config: RefineConfig, start: StartPose | None
-) -> tuple[Refinement, float]:
-    """The topometric map and the CPU seconds that it took."""
-    began = process_time()
-    refinement = refine(cognitive_map, network, config, start)
-    return refinement, process_time() - began
-
-
-def localize_recording(
-    observations: Iterable[Observation], cognitive_map: CognitiveMap, network: RoadNetwork | None, config: LocalizerConfig
-) -> Localization:
-    """Localize a drive from an unknown start."""
-    localizer, estimates, step_s = Localizer(cognitive_map, network, config), [], []
+def localize_recording(observations: Iterable[Observation], localizer: Localizer) -> Localization:
+    """Localize a drive from an unknown start, with a ``localizer`` that has seen nothing yet."""
+    estimates, step_s = [], []
     for observation in observations:
         began = process_time()
         estimates.append(localizer.step(observation))
@@ -92,21 +75,30 @@ def localize_recording(
     return Localization(estimates, np.array(step_s))
 
 
+def timed(
+    function: Callable[ArgumentsP, ResultT], *arguments: ArgumentsP.args, **named: ArgumentsP.kwargs
+) -> tuple[ResultT, float]:
+    """What a call returns, and the CPU seconds that it took."""
+    began = process_time()
+    result = function(*arguments, **named)
+    return result, process_time() - began
+
+
 def dead_reckoning(observations: Iterable[Observation]) -> tuple[Trajectory, float]:
-    """The self-motion integrated, in map units, and the CPU seconds of doing so."""
+    """The self-motion of a drive integrated from the origin on, in map units, and the CPU seconds that it took."""
     sensed = np.array([(o.t_s, o.speed * o.dt_s, o.yaw_rate_radps * o.dt_s) for o in observations])
     began = process_time()
-    half_turn = sensed[:, 2] / 2.0  # the chord of a short arc points half a turn ahead
+    half_turn = sensed[:, 2] / 2.0  # a step is a short arc; its chord is turned by half of the arc's angle
     motions = np.stack([sensed[:, 1] * np.cos(half_turn), sensed[:, 1] * np.sin(half_turn), sensed[:, 2]], axis=1)
     poses = se2.integrate(np.zeros(3), motions)
     return Trajectory(sensed[:, 0], poses), process_time() - began
 
 
 def map_files(recording: Path, scenario: Path | None, out: Path) -> None:
-    """``hippodrome map``."""
+    """``hippodrome map``: build the semi-metric map of a recording and save it. Raises HippodromeError on bad input."""
     source = open_recording(recording)
     config = _settings(scenario).mapper
-    cognitive_map, cpu_s = map_recording(source.observations(), config)
+    cognitive_map, cpu_s = map_recording(source.observations(), Mapper(config))
     size = save_map(out, cognitive_map, {"recording": recording.name, "mapper": repr(config)})
     duration_s = source.samples.t_s[-1]
     print(f"{out}: {len(cognitive_map.t_s)} vertices, {len(cognitive_map.edges.source)} edges, {size} bytes, "
@@ -114,14 +106,23 @@ def map_files(recording: Path, scenario: Path | None, out: Path) -> None:
 
 
 def refine_files(
-    source: Path, network: Path, mode: Literal["route", "paper"], start: StartPose | None, scenario: Path | None, out: Path
+    source: Path, network: Path, mode: RefineMode, start: StartPose | None, scenario: Path | None, out: Path
 ) -> None:
-    """``hippodrome refine``."""
+    """``hippodrome refine``: refine a semi-metric map with a road network. Raises HippodromeError on bad input.
+
+    Args:
+        source: The semi-metric map.
+        network: A SUMO network, or ``package:...`` of one that is installed.
+        mode: Mode of the refinement.
+        start: Where the mapping drive began; mode ``paper`` needs it.
+        scenario: Where the refinement's settings are from; None takes the defaults.
+        out: The topometric map.
+    """
     if mode == "paper" and start is None:
         raise HippodromeError("mode 'paper' begins at a known pose: give --start X,Y,HEADING, or use --mode route")
     cognitive_map, provenance = load_map(source)
     config = replace(_settings(scenario).refine, mode=mode)
-    refinement, cpu_s = refine_map(cognitive_map, read_network(located(network, "--network")), config, start)
+    refinement, cpu_s = timed(refine, cognitive_map, read_network(located(network, "--network")), config, start)
     save_map(out, refinement.cognitive_map, {**provenance, "network": network.name, "refine": repr(config)})
     for stretch in refinement.breaks:
         print(f"vertices {stretch.first_vertex}-{stretch.last_vertex}: {stretch.status.name.lower()}: {stretch.cause}")
@@ -130,18 +131,27 @@ def refine_files(
 
 
 def localize_files(source: Path, recording: Path, network: Path | None, scenario: Path | None, out: Path) -> None:
-    """``hippodrome localize``."""
+    """``hippodrome localize``: localize a recording in a topometric map. Raises HippodromeError on bad input.
+
+    Args:
+        source: The topometric map.
+        recording: The drive to localize.
+        network: A SUMO network whose lanes the estimate is pulled to; None does without.
+        scenario: Where the localizer's settings are from; None takes the defaults.
+        out: The poses that the localizer declared, as TUM. Not written if it never declared one.
+    """
     cognitive_map, _ = load_map(source)
     if cognitive_map.frame != "network":
         raise HippodromeError(f"{source}: a semi-metric map has no metric frame to localize in; run `hippodrome refine` first")
     drive = open_recording(recording)
     roads = read_network(located(network, "--network")) if network else None
-    run = localize_recording(drive.observations(), cognitive_map, roads, _settings(scenario).localizer)
-    known = [estimate for estimate in run.estimates if estimate.localized]
-    if known:
-        write_tum(out, Trajectory(np.array([e.t_s for e in known]), np.stack([e.pose for e in known])))
-    first = f"first at {known[0].t_s:.1f} s, written to {out}" if known else "never localized, nothing written"
-    print(f"localized in {len(known)} of {len(run.estimates)} steps, {first}; {1e3 * run.step_s.mean():.3f} ms a step")
+    run = localize_recording(drive.observations(), Localizer(cognitive_map, roads, _settings(scenario).localizer))
+    declared = run.declared()
+    if declared is not None:
+        write_tum(out, declared)
+    count = 0 if declared is None else len(declared.t_s)
+    first = "never localized, nothing written" if declared is None else f"first at {declared.t_s[0]:.1f} s, written to {out}"
+    print(f"localized in {count} of {len(run.estimates)} steps, {first}; {1e3 * run.step_s.mean():.3f} ms a step")
 
 
 def _settings(scenario: Path | None) -> Scenario:

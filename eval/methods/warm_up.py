@@ -1,7 +1,7 @@
 """Compile and load the inner loops before anything is timed: ``python -m hippodrome.eval.methods.warm_up`` (``make setup``).
 
-Numba compiles at the first call and keeps the machine code beside the sources. A minute's drive through a very small town, seen
-through frames of noise, calls every kernel once; what it computes is thrown away.
+Numba compiles a function at its first call and keeps the machine code beside the sources. A drive of about a minute through a
+very small town, with noise for camera frames, calls every compiled function once; what it computes is thrown away.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hippodrome.core.localization.localizer import LocalizerConfig
-from hippodrome.core.mapping.mapper import MapperConfig
-from hippodrome.core.refinement.refine import RefineConfig
+from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
+from hippodrome.core.mapping.mapper import Mapper, MapperConfig
+from hippodrome.core.refinement.refine import RefineConfig, refine
 from hippodrome.core.types import HippodromeError, Observation, StartPose
-from hippodrome.eval.methods.stages import localize_recording, map_recording, refine_map
+from hippodrome.eval.methods.stages import localize_recording, map_recording
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.ego import EgoSpec
 from hippodrome.sim.self_motion import NOISE_LEVELS, sense_self_motion
@@ -26,12 +26,12 @@ from hippodrome.sim.town import TownSpec, build_town
 from hippodrome.sim.traffic import TrafficSpec
 
 TOWN = TownSpec(kind="grid", width_m=150.0, height_m=150.0, road_km=0.9)
-RATE_HZ = 5.0
+RATE_HZ = 5.0  # of observations
 
 
 @cache
 def warm_up() -> None:
-    """Once per process."""
+    """Run the whole chain on a small drive, once per process."""
     with tempfile.TemporaryDirectory() as folder:
         town = build_town(TOWN, 1, Path(folder))
         drive = simulate_drive(town, TourSpec(length_m=700.0), TrafficSpec(vehicles=0), EgoSpec(), 1)
@@ -44,13 +44,13 @@ def warm_up() -> None:
             frame = rng.integers(0, 256, (120, 160, 3), dtype=np.uint8)
             yield Observation(float(t_s), motion.dt_s, float(speed), float(yaw_rate), frame)
 
-    cognitive_map, _ = map_recording(observations(), MapperConfig())
+    cognitive_map, _ = map_recording(observations(), Mapper(MapperConfig()))
     for mode in ("route", "paper"):
         try:
-            refinement, _ = refine_map(cognitive_map, town.network, RefineConfig(mode=mode), start)
+            refinement = refine(cognitive_map, town.network, RefineConfig(mode=mode), start)
         except HippodromeError:
-            continue  # refused is refused; what the refusal took is compiled
-        localize_recording(observations(), refinement.cognitive_map, town.network, LocalizerConfig())
+            continue  # a refinement that refuses the map has called its functions all the same
+        localize_recording(observations(), Localizer(refinement.cognitive_map, town.network, LocalizerConfig()))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Alignment of an estimated trajectory to a reference: pure functions that return transforms, nothing is changed in place."""
+"""Alignment of an estimated trajectory to a reference: functions that find a transform, and functions that apply one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
 
 AlignmentName: TypeAlias = Literal["none", "start", "se2", "sim2", "se3", "sim3"]
 
-LABELS: Final = {
+LABELS: Final = {  # in the definitions of scores
     "none": "none",
     "start": "start (first pose, no scale)",
     "se2": "SE(2)",
@@ -21,7 +21,7 @@ LABELS: Final = {
     "sim3": "Sim(3)",
 }
 
-DEGENERATE_RATIO = 1e-12  # singular values below this share of the point spread are rounding, not geometry
+DEGENERATE_RATIO = 1e-12  # singular values below this share of the points' spread come from rounding
 
 
 class DegenerateAlignment(HippodromeError):
@@ -47,13 +47,22 @@ def identity() -> Transform:
 
 
 def start_alignment(estimate_pose: FloatArray, reference_pose: FloatArray) -> Transform:
-    """Rigid transform, no scale, that lays the estimate's first pose (3,) on the reference's."""
+    """The rigid transform that lays the first pose (3,) of the estimate on that of the reference."""
     x_m, y_m, turn_rad = se2.compose(reference_pose, se2.inverse(estimate_pose))
     return Transform(_rotation(turn_rad), np.array([x_m, y_m]), 1.0)
 
 
 def umeyama(source: FloatArray, target: FloatArray, *, with_scale: bool) -> Transform:
-    """Eqs. (34)-(43), Umeyama 1991: least-squares rigid or similarity transform of points (N, m) onto points (N, m)."""
+    """Eqs. (34)-(43), Umeyama 1991: the least-squares rigid or similarity transform of points onto points.
+
+    Args:
+        source: Points (N, m) that are moved.
+        target: Points (N, m) that they are moved to.
+        with_scale: Whether the transform may scale.
+
+    Raises:
+        DegenerateAlignment: The points do not determine the transform.
+    """
     count, dimension = source.shape
     source_mean, target_mean = source.mean(axis=0), target.mean(axis=0)
     source_centred, target_centred = source - source_mean, target - target_mean
@@ -72,10 +81,18 @@ def umeyama(source: FloatArray, target: FloatArray, *, with_scale: bool) -> Tran
 
 
 def find_alignment(name: AlignmentName, estimate_poses: FloatArray, reference_poses: FloatArray) -> Transform:
-    """The named transform that takes estimated poses (N, 3) to the reference poses (N, 3) of the same instants.
+    """The transform that takes estimated poses to the reference poses of the same instants.
 
-    The 3-D fits lift the plane to z = 0, as evo does. A 3-D rotation may turn the plane over, so on a mirrored
-    estimate SE(3) fits better than SE(2).
+    The fits in space put the plane at z = 0, as evo does. A rotation in space may turn the plane over, so that SE(3) fits a
+    mirrored estimate better than SE(2).
+
+    Args:
+        name: ``none``; ``start``, which lays the first pose on the first pose without scaling; or the best fit of a group.
+        estimate_poses: Poses (N, 3).
+        reference_poses: Poses (N, 3).
+
+    Raises:
+        DegenerateAlignment: The poses do not determine the fit.
     """
     if name == "none":
         return identity()
@@ -96,7 +113,7 @@ def apply_to_positions(transform: Transform, positions: FloatArray) -> FloatArra
 
 
 def apply_to_trajectory(transform: Transform, trajectory: Trajectory) -> Trajectory:
-    """The trajectory moved by a planar transform."""
+    """The trajectory moved by a planar transform. Raises ValueError if the transform is one in space."""
     if transform.dimension != 2:
         raise ValueError("poses of the plane take a planar transform: use SE(2) or Sim(2)")
     turn_rad = np.arctan2(transform.rotation[1, 0], transform.rotation[0, 0])

@@ -1,4 +1,4 @@
-"""Which estimated samples have ground truth at their time stamps. Never across a gap, never below a coverage floor."""
+"""Which estimated samples have ground truth at their time stamps: never across a gap, and never for too small a share of them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray, Trajectory
 
-MAX_GAP_S = 0.25  # ground truth comes at the camera's rate, 5-12 Hz; at 15 m/s a chord over 0.25 s leaves a curve by < 0.1 m
-MIN_COVERAGE = 0.95  # a score over less of the drive says little about the drive
+# Reference samples farther apart than this are not interpolated. Ground truth comes at the camera's rate, 5 to 12 Hz; at 15 m/s a
+# chord over 0.25 s leaves a curve by less than 0.1 m.
+MAX_GAP_S = 0.25
+MIN_COVERAGE = 0.95  # least share of the estimated samples that must have ground truth for a score to be one of the whole drive
 
 
 class CoverageError(HippodromeError):
@@ -24,20 +26,31 @@ class TrajectoryError(HippodromeError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Association:
-    """The matched samples of an estimate, in time order, with the reference at the same instants."""
+    """The N samples of an estimate that have ground truth, in time order, with the reference at the same instants."""
 
     t_s: FloatArray  # (N,)
-    estimate: FloatArray  # (N, 3)
-    reference: FloatArray  # (N, 3) interpolated
-    index: IntArray  # (N,) into the estimate
-    segment: IntArray  # (N,) stretch of the reference without gaps; pairs stay within one
-    total: int  # samples of the estimate, matched or not
+    estimate: FloatArray  # (N, 3) poses
+    reference: FloatArray  # (N, 3) poses, interpolated
+    index: IntArray  # (N,) number of each sample in the estimate
+    segment: IntArray  # (N,) number of the stretch of the reference without gaps that it lies in; pairs stay within one stretch
+    total: int  # samples of the estimate, with ground truth or without
 
 
 def associate(
     estimate: Trajectory, reference: Trajectory, *, max_gap_s: float = MAX_GAP_S, min_coverage: float = MIN_COVERAGE
 ) -> Association:
-    """Reference poses at the estimate's time stamps; linear in position, shortest arc in heading."""
+    """Reference poses at the estimate's time stamps, interpolated linearly in position and along the shorter arc in heading.
+
+    Args:
+        estimate: The trajectory whose times count.
+        reference: Ground truth.
+        max_gap_s: Reference samples farther apart than this are not interpolated.
+        min_coverage: Least share of the estimated samples that must have ground truth.
+
+    Raises:
+        TrajectoryError: One of the two is no trajectory.
+        CoverageError: Too few of the estimated samples have ground truth.
+    """
     check_trajectory(estimate, "estimate")
     check_trajectory(reference, "reference")
     after = np.clip(np.searchsorted(reference.t_s, estimate.t_s, side="left"), 1, max(len(reference.t_s) - 1, 1))
@@ -49,22 +62,20 @@ def associate(
     return Association(
         t_s=estimate.t_s[index],
         estimate=estimate.poses[index],
-        reference=interpolate(reference, estimate.t_s[index]),
+        reference=se2.interpolate(reference.t_s, reference.poses, estimate.t_s[index]),
         index=index,
         segment=segment[nearest].astype(np.int32),
         total=len(estimate.t_s),
     )
 
 
-def interpolate(trajectory: Trajectory, t_s: FloatArray) -> FloatArray:
-    """Poses (N, 3) at times within the trajectory's span."""
-    columns = [np.interp(t_s, trajectory.t_s, trajectory.poses[:, axis]) for axis in (0, 1)]
-    heading = np.interp(t_s, trajectory.t_s, np.unwrap(trajectory.poses[:, 2]))
-    return np.column_stack([*columns, se2.wrap(heading)])
-
-
 def check_trajectory(trajectory: Trajectory, name: str) -> None:
-    """Raise unless times increase, all is finite and the shapes agree."""
+    """Raise TrajectoryError unless the shapes agree, there are samples, all values are finite and times increase.
+
+    Args:
+        trajectory: The trajectory.
+        name: What the error calls it.
+    """
     t_s, poses = trajectory.t_s, trajectory.poses
     if t_s.ndim != 1 or poses.shape != (len(t_s), 3):
         raise TrajectoryError(f"{name}: times {t_s.shape} and poses {poses.shape} do not fit, expected (N,) and (N, 3)")
@@ -79,7 +90,10 @@ def check_trajectory(trajectory: Trajectory, name: str) -> None:
 
 
 def _covered(t_s: FloatArray, reference_t_s: FloatArray, after: NDArray[np.intp], max_gap_s: float) -> NDArray[np.bool_]:
-    """Whether each time (N,) meets a reference sample or lies between two that are at most ``max_gap_s`` apart."""
+    """Whether each time (N,) is that of a reference sample, or lies between two that are at most ``max_gap_s`` apart.
+
+    ``after`` (N,) is the number of the first reference sample at or after each time, at least 1.
+    """
     last = len(reference_t_s) - 1
     exact: NDArray[np.bool_] = (reference_t_s[np.minimum(after, last)] == t_s) | (reference_t_s[after - 1] == t_s)
     if last == 0:

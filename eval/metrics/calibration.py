@@ -1,4 +1,4 @@
-"""Whether stated covariances are true: normalised estimation error squared."""
+"""Whether stated covariances are true: the normalised estimation error squared (NEES), Bar-Shalom et al. 2001, Sec. 5.4."""
 
 from __future__ import annotations
 
@@ -10,13 +10,24 @@ from hippodrome.eval.metrics.trajectory import MetricError
 
 
 def pose_errors(estimate: FloatArray, reference: FloatArray) -> FloatArray:
-    """Estimate minus reference (N, 3) in the network frame: m, m, rad in (-pi, pi]."""
+    """Estimated minus reference poses (N, 3) in the network's frame: m, m, rad in (-pi, pi]."""
     difference = np.asarray(estimate - reference, dtype=np.float64)
     return np.column_stack([difference[:, :2], se2.wrap(difference[:, 2])])
 
 
 def nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
-    """``e^T P^-1 e`` (N,) of errors (N, K) under covariances (N, K, K): chi-squared with K degrees of freedom if P is true."""
+    """The NEES ``e^T P^-1 e`` of each error; it is chi-squared with K degrees of freedom if the covariances are true.
+
+    Args:
+        errors: Errors (N, K).
+        covariances: Their stated covariances (N, K, K).
+
+    Returns:
+        The NEES (N,).
+
+    Raises:
+        MetricError: A covariance is not positive definite.
+    """
     try:
         np.linalg.cholesky(covariances)
         weighted = np.linalg.solve(covariances, errors[..., np.newaxis])[..., 0]
@@ -27,7 +38,11 @@ def nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
 
 
 def mean_nees(errors: FloatArray, covariances: FloatArray) -> float:
-    """Mean NEES per dimension: 1 if calibrated, above 1 if overconfident."""
+    """Mean NEES per dimension of errors (N, K) under covariances (N, K, K): 1 if calibrated, above 1 if overconfident.
+
+    Raises:
+        MetricError: There are no errors, or a covariance is not positive definite.
+    """
     if len(errors) == 0:
         raise MetricError("NEES of no errors")
     return float(nees(errors, covariances).mean() / errors.shape[1])

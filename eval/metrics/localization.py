@@ -13,37 +13,38 @@ from hippodrome.eval.metrics.association import MAX_GAP_S, MIN_COVERAGE, associa
 from hippodrome.eval.metrics.calibration import mean_nees, pose_errors
 from hippodrome.eval.metrics.trajectory import MetricError, path_length_m
 
-FALSE_FIX_M = 20.0  # declared localized, yet farther off than one is from the next street: a confident wrong answer
+FALSE_FIX_M = 20.0  # a declared pose farther off than this, about the distance to the next street, is a confident wrong answer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalizationScore:
     """One drive in a known map from an unknown start.
 
-    *Localized* is what the localizer declares. The initial localization is its first declaration within ``FALSE_FIX_M`` of the
-    truth; without one the drive is a failure and the ``initial_*`` and ``error_*`` figures are None.
+    A step is *declared* if the localizer declares itself localized in it. The *initial localization* is the first declared step
+    within ``FALSE_FIX_M`` of the truth; without one the drive failed, and the ``initial_*`` and ``error_*`` figures are None.
     """
 
     definition: str
     success: bool
-    initial_time_ms: float | None  # compute from the first frame to the initial localization, map loading excluded
-    initial_drive_s: float | None  # driving time to it
-    initial_distance_m: float | None  # metres driven to it
-    initial_frames: int | None  # observations up to and including it
-    error_mean_m: float | None  # over the steps declared localized, from the initial localization on, false fixes included
+    initial_time_ms: float | None  # compute from the first frame to the initial localization, without loading the map
+    initial_drive_s: float | None  # driving time until the initial localization
+    initial_distance_m: float | None  # metres driven until the initial localization
+    initial_frames: int | None  # observations up to and including the initial localization
+    error_mean_m: float | None  # over the declared steps from the initial localization on, false fixes included
     error_median_m: float | None
     error_p95_m: float | None
     error_max_m: float | None
     drive_error_mean_m: float | None  # over all steps from the initial localization on, declared or not
-    heading_error_mean_rad: float | None
-    false_fixes: int  # separate stretches declared localized and more than FALSE_FIX_M wrong
-    false_fix_share: float  # of the declared steps
-    localized_share: float  # of all steps
-    mean_nees: float | None  # normalised estimation error squared per dimension (x, y, heading), declared steps; 1 is calibrated,
-    # None without declared steps or if one of their covariances is not positive definite
-    matched: int
-    total: int
-    t_s: FloatArray  # (N,) steps with ground truth
+    heading_error_mean_rad: float | None  # over the same steps as ``error_mean_m``
+    false_fixes: int  # separate stretches of declared steps more than ``FALSE_FIX_M`` wrong
+    false_fix_share: float  # share of such steps in the declared ones
+    localized_share: float  # share of the declared steps in all
+    # Normalised estimation error squared per dimension (x, y, heading) over the declared steps; 1 is calibrated. None if there
+    # are no declared steps, or if one of their covariances is not positive definite.
+    mean_nees: float | None
+    matched: int  # steps with ground truth
+    total: int  # steps
+    t_s: FloatArray  # (N,) of the steps with ground truth, as the two below
     errors_m: FloatArray  # (N,)
     localized: NDArray[np.bool_]  # (N,)
 
@@ -56,7 +57,18 @@ def score_localization(
     max_gap_s: float = MAX_GAP_S,
     min_coverage: float = MIN_COVERAGE,
 ) -> LocalizationScore:
-    """Score the estimates (T), one per observation, with the compute time (T,) that each step took."""
+    """Score a localizer's estimates of one drive.
+
+    Args:
+        estimates: One estimate per observation, T in all.
+        truth: Ground truth.
+        step_compute_s: Compute time (T,) that each step took.
+        max_gap_s: Reference samples farther apart than this are not interpolated.
+        min_coverage: Least share of the steps that must have ground truth.
+
+    Raises:
+        HippodromeError: There are no estimates, not as many times, or too few steps have ground truth.
+    """
     if len(estimates) != len(step_compute_s):
         raise MetricError(f"{len(estimates)} estimates but {len(step_compute_s)} step times: one each per observation")
     if not estimates:

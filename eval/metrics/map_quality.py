@@ -1,4 +1,4 @@
-"""What else a map gets right or wrong: the lanes of its vertices and its loop closures."""
+"""What else a map gets right or wrong beside its poses: the lanes of its vertices, and its loop closures."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from hippodrome.core import se2
 from hippodrome.core.types import CognitiveMap, EdgeKind, FloatArray, IntArray, RoadMatch
 from hippodrome.eval.metrics.trajectory import MetricError
 
-REVISIT_RADIUS_M = 15.0  # views farther apart do not show the same place through a forward camera
-REVISIT_HEADING_RAD = np.pi / 4.0  # nor do views in different directions
-REVISIT_GAP_S = 20.0  # sooner, it is the same visit
+REVISIT_RADIUS_M = 15.0  # views that are farther apart do not show the same place through a forward camera
+REVISIT_HEADING_RAD = np.pi / 4.0  # views whose directions differ by more do not either
+REVISIT_GAP_S = 20.0  # a vertex that is nearer in time belongs to the same visit of the place
 
 
 @dataclass(frozen=True, slots=True)
 class LaneAccuracy:
-    """Vertices whose estimated lane is the lane driven. Unmatched vertices count as neither right nor wrong, but are shown."""
+    """How many vertices are on the lane that was driven. Unmatched vertices count as neither right nor wrong."""
 
     right: int
     wrong: int
     unmatched: int
-    right_edge: int  # right road and direction, whatever the lane
+    right_edge: int  # on the right road in the right direction, whatever the lane
 
     @property
     def total(self) -> int:
@@ -33,6 +33,7 @@ class LaneAccuracy:
 
     @property
     def share_right(self) -> float:
+        """Share of all vertices that are right."""
         return self.right / self.total
 
     @property
@@ -43,7 +44,15 @@ class LaneAccuracy:
 
 
 def matched_lane_accuracy(estimated: Sequence[str | None], true: Sequence[str]) -> LaneAccuracy:
-    """Compare lane ids per vertex; None: unmatched. SUMO names a lane ``edge_index``."""
+    """Compare the lanes of vertices.
+
+    Args:
+        estimated: Lane id of each vertex, None where it is unmatched. SUMO calls a lane by its edge and index, ``edge_index``.
+        true: Lane id of the lane that was driven at each vertex's time.
+
+    Raises:
+        MetricError: The two do not belong together, or are empty.
+    """
     if len(estimated) != len(true) or not true:
         raise MetricError(f"{len(estimated)} estimated lanes for {len(true)} true ones: one each per vertex, at least one")
     pairs = [(lane, other) for lane, other in zip(estimated, true, strict=True) if lane is not None]
@@ -59,13 +68,13 @@ def matched_lane_ids(match: RoadMatch) -> list[str | None]:
 
 @dataclass(frozen=True, slots=True)
 class PlaceRecognition:
-    """Closures judged by where the vertices truly were."""
+    """Loop closures judged by where their vertices truly were."""
 
     definition: str
     accepted: int  # closures in the map
     false: int  # closures between different places
-    revisits: int  # vertices that truly came back to a place
-    recalled: int  # of these, with a right closure
+    revisits: int  # vertices at which the vehicle truly came back to a place
+    recalled: int  # revisits with a right closure
 
     @property
     def precision(self) -> float:
@@ -79,7 +88,7 @@ class PlaceRecognition:
 
 
 def closures(cognitive_map: CognitiveMap) -> tuple[IntArray, IntArray]:
-    """Source and target vertices of the loop closures."""
+    """Source and target vertices (E,) of the loop closures."""
     chosen = cognitive_map.edges.kind == EdgeKind.CLOSURE
     return cognitive_map.edges.source[chosen], cognitive_map.edges.target[chosen]
 
@@ -87,7 +96,15 @@ def closures(cognitive_map: CognitiveMap) -> tuple[IntArray, IntArray]:
 def score_closures(
     source: IntArray, target: IntArray, true_poses: FloatArray, t_s: FloatArray, radius_m: float = REVISIT_RADIUS_M
 ) -> PlaceRecognition:
-    """Judge closures (E,) by the true poses (V, 3) of the vertices at their times (V,)."""
+    """Judge loop closures by the true poses of their vertices.
+
+    Args:
+        source: Source vertex of each closure (E,).
+        target: Target vertex of each closure (E,).
+        true_poses: True poses (V, 3) of all vertices.
+        t_s: Times (V,) of all vertices.
+        radius_m: Poses that are farther apart are different places.
+    """
     same = _same_place(true_poses[source], true_poses[target], radius_m)
     later = np.where(t_s[source] >= t_s[target], source, target)
     is_revisit = _revisits(true_poses, t_s, radius_m)
@@ -109,7 +126,7 @@ def _same_place(a: FloatArray, b: FloatArray, radius_m: float) -> NDArray[np.boo
 
 
 def _revisits(poses: FloatArray, t_s: FloatArray, radius_m: float) -> NDArray[np.bool_]:
-    """Whether each vertex (V,) lies where an earlier visit passed in the same direction."""
+    """Whether each vertex (V,) lies where the vehicle passed before in the same direction."""
     pairs = cKDTree(poses[:, :2]).query_pairs(radius_m, output_type="ndarray")
     same = pairs[_same_place(poses[pairs[:, 0]], poses[pairs[:, 1]], radius_m)]
     apart = same[np.abs(t_s[same[:, 0]] - t_s[same[:, 1]]) >= REVISIT_GAP_S]

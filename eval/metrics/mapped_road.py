@@ -1,4 +1,4 @@
-"""Which part of a drive lies on road that a map shows: elsewhere nothing can be recognised, and no localizer is blamed for it."""
+"""Which part of a drive lies on mapped road. Elsewhere nothing can be recognised, which is not the localizer's fault."""
 
 from __future__ import annotations
 
@@ -15,23 +15,31 @@ from hippodrome.core.types import CognitiveMap, FloatArray
 from hippodrome.eval.metrics.localization import FALSE_FIX_M, LocalizationScore
 from hippodrome.eval.metrics.trajectory import path_length_m
 
-SAME_WAY_RAD: Final = np.deg2rad(60.0)  # a street that was mapped the other way only has been seen from behind: not mapped
+# A vertex shows the road in directions that differ from its own by less than this: a street that was mapped in the opposite
+# direction only has been seen from behind, and counts as not mapped.
+SAME_WAY_RAD: Final = np.deg2rad(60.0)
 MAPPED: Final = f"road with a place of the map within {SAME_PLACE_M:g} m, facing the same way"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OnMap:
-    """A score, told apart by whether the map shows the road."""
+    """A localization score, split into steps on mapped road and steps elsewhere."""
 
-    localized_after_m: float | None  # mapped road driven until the initial localization; None: never
-    errors_m: FloatArray  # declared steps on mapped road, from the initial localization on
-    off_map_errors_m: FloatArray  # declared steps elsewhere: dead reckoning
-    steps: int  # from the initial localization on
-    way_m: float  # mapped road of the whole drive
+    localized_after_m: float | None  # metres of mapped road until the initial localization; None if there was none
+    errors_m: FloatArray  # errors of the declared steps on mapped road, from the initial localization on
+    off_map_errors_m: FloatArray  # errors of the declared steps elsewhere, where the localizer reckons dead
+    steps: int  # number of steps from the initial localization on
+    way_m: float  # metres of mapped road in the whole drive
 
 
 def split_by_map(score: LocalizationScore, poses_m: FloatArray, cognitive_map: CognitiveMap) -> OnMap:
-    """``poses_m`` (N, 3): true, of the score's steps."""
+    """Split a localization score by whether the road was mapped.
+
+    Args:
+        score: The score of N steps.
+        poses_m: True poses (N, 3) of these steps.
+        cognitive_map: The map that the drive was localized in.
+    """
     mapped, errors_m = on_mapped_road(poses_m, cognitive_map), score.errors_m
     right = score.localized & (errors_m <= FALSE_FIX_M)
     first = int(np.argmax(right)) if right.any() else len(right)

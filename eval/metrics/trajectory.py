@@ -1,6 +1,6 @@
 """Trajectory errors as pure functions (estimate, reference) -> ``Score``, equal to evo's on the same poses.
 
-Every score carries its definition; two scores with different definitions refuse comparison.
+Every score carries its definition; scores with different definitions cannot be pooled.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ from hippodrome.eval.metrics.association import (
 Pairing: TypeAlias = Literal["all", "chained"]
 Indices: TypeAlias = NDArray[np.intp]
 
-PATH_TOLERANCE = 0.1  # evo's default: an "all" pair counts if its path is within 10 % of the delta
+PATH_TOLERANCE = 0.1  # evo's default: a pair counts if the path between its samples is within 10 % of the delta
 
 
 class MetricError(HippodromeError):
-    """A score that cannot be computed from these trajectories, or two that cannot be compared."""
+    """A score that cannot be computed from these trajectories, or scores that cannot be pooled."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Score:
     """Errors of one metric over one estimate, or over several pooled ones."""
 
-    definition: str  # metric, alignment, delta, unit, pairing
-    errors_m: FloatArray  # (N,) one per sample (APE) or pair (RPE)
-    t_s: FloatArray  # (N,) when; for a pair, its second sample
+    definition: str  # metric, alignment, delta, unit and pairing in words
+    errors_m: FloatArray  # (N,) one per sample (APE) or per pair of samples (RPE)
+    t_s: FloatArray  # (N,) time of the sample, or of the second one of the pair
     matched: int  # estimated samples with ground truth
     total: int  # estimated samples
 
@@ -81,7 +81,18 @@ def ape(
     max_gap_s: float = MAX_GAP_S,
     min_coverage: float = MIN_COVERAGE,
 ) -> Score:
-    """Absolute position error: distance of each estimated position to the reference at the same instant."""
+    """Absolute position error: the distance of each estimated position to the reference at the same instant.
+
+    Args:
+        estimate: The trajectory to score.
+        reference: Ground truth.
+        alignment: How the estimate is moved before distances are taken, see ``find_alignment``.
+        max_gap_s: Reference samples farther apart than this are not interpolated.
+        min_coverage: Least share of the estimated samples that must have ground truth.
+
+    Raises:
+        HippodromeError: One of the two is no trajectory, too few samples have ground truth, or the alignment is degenerate.
+    """
     pairs = associate(estimate, reference, max_gap_s=max_gap_s, min_coverage=min_coverage)
     transform = find_alignment(alignment, pairs.estimate, pairs.reference)
     moved = apply_to_positions(transform, pairs.estimate[:, :2])
@@ -100,10 +111,21 @@ def rpe(
     max_gap_s: float = MAX_GAP_S,
     min_coverage: float = MIN_COVERAGE,
 ) -> Score:
-    """Relative pose error, translation: motion between two samples, estimated against true, each in its own start frame.
+    """Relative pose error, translation: the motion between two samples, estimated against true.
 
-    ``delta_m=None`` pairs consecutive samples; otherwise pairs lie ``delta_m`` apart along the reference path.
-    No alignment (the error does not depend on a rigid one) and no scale correction.
+    Each motion is expressed in the frame of its first sample. There is no alignment, as the error does not depend on a rigid one,
+    and no correction of scale.
+
+    Args:
+        estimate: The trajectory to score.
+        reference: Ground truth.
+        delta_m: How far apart along the reference path the samples of a pair are; None pairs consecutive samples.
+        pairing: With a delta, whether a pair begins at every sample (``all``), or where the one before ended (``chained``).
+        max_gap_s: Reference samples farther apart than this are not interpolated, and no pair spans such a gap.
+        min_coverage: Least share of the estimated samples that must have ground truth.
+
+    Raises:
+        HippodromeError: One of the two is no trajectory, too few samples have ground truth, or there is no pair.
     """
     matched = associate(estimate, reference, max_gap_s=max_gap_s, min_coverage=min_coverage)
     first, second, clause = _pairs(matched, delta_m, pairing)
@@ -119,11 +141,15 @@ def rpe(
 
 
 def pool(scores: Sequence[Score]) -> Score:
-    """One score over the samples of several runs. Means of means would weigh runs wrongly, means of RMSEs are no RMSE."""
+    """One score over the samples of several runs: a mean of means would weigh runs wrongly, and a mean of RMSEs is no RMSE.
+
+    Raises:
+        MetricError: There are no scores, or their definitions differ.
+    """
     if not scores:
         raise MetricError("no scores to pool")
     for other in scores[1:]:
-        require_same_definition(scores[0], other)
+        _require_same_definition(scores[0], other)
     return Score(
         definition=scores[0].definition,
         errors_m=np.concatenate([score.errors_m for score in scores]),
@@ -133,41 +159,20 @@ def pool(scores: Sequence[Score]) -> Score:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """How a candidate's error relates to a baseline's."""
-
-    definition: str
-    mean_change_m: float  # candidate - baseline
-    median_change_m: float
-    mean_ratio: float  # candidate / baseline; inf if only the baseline is perfect, 1 if both are
-
-
-def compare(candidate: Score, baseline: Score) -> Comparison:
-    """Compare two scores of one definition."""
-    require_same_definition(candidate, baseline)
-    if baseline.mean_m == 0.0:
-        ratio = 1.0 if candidate.mean_m == 0.0 else float("inf")
-    else:
-        ratio = candidate.mean_m / baseline.mean_m
-    change_m = candidate.mean_m - baseline.mean_m
-    return Comparison(candidate.definition, change_m, candidate.median_m - baseline.median_m, ratio)
-
-
-def require_same_definition(a: Score, b: Score) -> None:
-    """Raise unless the two scores measure the same thing."""
-    if a.definition != b.definition:
-        raise MetricError(f"scores of different definitions cannot be compared: '{a.definition}' and '{b.definition}'")
-
-
 def path_length_m(poses: FloatArray) -> FloatArray:
-    """Distance travelled (N,) along poses (N, 3), from chords."""
+    """Distance travelled (N,) up to each of the poses (N, 2 or more columns), along the chords between them."""
     steps = np.diff(poses[:, :2], axis=0)
     return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
 
 
+def _require_same_definition(a: Score, b: Score) -> None:
+    """Raise MetricError unless the two scores measure the same thing."""
+    if a.definition != b.definition:
+        raise MetricError(f"scores of different definitions cannot be compared: '{a.definition}' and '{b.definition}'")
+
+
 def _pairs(matched: Association, delta_m: float | None, pairing: Pairing) -> tuple[Indices, Indices, str]:
-    """Indices of first and second samples, and how they were found."""
+    """Numbers of the first and second samples of all pairs, and in words how the pairs were found."""
     if delta_m is None:
         first = np.flatnonzero((np.diff(matched.segment) == 0) & (np.diff(matched.index) == 1))
         return first, first + 1, "delta 1 sample; consecutive samples"
@@ -180,20 +185,23 @@ def _pairs(matched: Association, delta_m: float | None, pairing: Pairing) -> tup
 
 
 def _all_pairs(along_m: FloatArray, delta_m: float) -> Indices:
-    """From every sample to the one nearest to ``delta_m`` ahead, (K, 2); the earlier of two equally near."""
+    """Pairs (K, 2) from every sample to the one nearest to ``delta_m`` ahead, or to the earlier of two equally near ones.
+
+    ``along_m`` (N,) is the distance travelled up to each sample. Pairs that miss the delta by more than 10 % are left out.
+    """
     first = np.arange(len(along_m) - 1)
     goal_m = along_m[first] + delta_m
     above = np.clip(np.searchsorted(along_m, goal_m, side="left"), first + 1, len(along_m) - 1)
     below = np.maximum(above - 1, first + 1)
     nearer_below = np.abs(along_m[below] - along_m[first] - delta_m) <= np.abs(along_m[above] - along_m[first] - delta_m)
     second = np.searchsorted(along_m, along_m[np.where(nearer_below, below, above)], side="left")
-    second = np.maximum(second, first + 1)  # of several samples at one place (a stop), the first, as evo's argmin
+    second = np.maximum(second, first + 1)  # of several samples at one place, during a stop, the first one, as evo's argmin does
     close = np.abs(along_m[second] - along_m[first] - delta_m) <= PATH_TOLERANCE * delta_m
     return np.column_stack([first[close], second[close]])
 
 
 def _chained_pairs(along_m: FloatArray, delta_m: float) -> Indices:
-    """Pairs (K, 2) end to end: each ends at the first sample at least ``delta_m`` on, where the next begins."""
+    """Pairs (K, 2) end to end: each ends at the first sample at least ``delta_m`` farther on, where the next one begins."""
     ends = [0]
     while (following := int(np.searchsorted(along_m, along_m[ends[-1]] + delta_m, side="left"))) < len(along_m):
         ends.append(following)

@@ -12,16 +12,13 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.figures.style import BLUE, ERROR_MAP, ROAD, TRUTH, Axes, new_figure, save_figure
-from hippodrome.eval.report.evidence import (
-    MAP_JSON,
-    THUMBNAILS,
-    Layer,
-    MapEvidence,
-    read_map_evidence,
-)
-from hippodrome.eval.results.model import Row, ScenarioResult, read_results
+from hippodrome.eval.methods.method import SEMI_METRIC, TOPOMETRIC
+from hippodrome.eval.report.evidence import MAP_JSON, THUMBNAILS, Layer, MapEvidence, read_map_evidence
+from hippodrome.eval.results import markdown
+from hippodrome.eval.results.model import Row, ScenarioResult, read_results, result_of
 from hippodrome.eval.results.paper_rows import quoted_rows
 from hippodrome.eval.results.tables import (
     LOCALIZATION_COLUMNS,
@@ -30,18 +27,25 @@ from hippodrome.eval.results.tables import (
     Column,
     row_cells,
 )
-from hippodrome.eval.run import result_of
-from hippodrome.proto.atomic import write_atomically
 
-SHOWN: Final = ("semi-metric", "topometric")
-COLOUR_RANGE_M: Final = (0.05, 5.0)  # from a tyre's width to a car's length
-FRAMES = 4  # of the drive, one above the other in pairs
+SHOWN: Final = (SEMI_METRIC.label, TOPOMETRIC.label)
+COLOUR_RANGE_M: Final = (0.05, 5.0)  # of the errors, from a tyre's width to a car's length
+FRAMES: Final = 4  # shown of the drive, in two rows
 PICTURE, README = Path("docs/result.png"), Path("README.md")
 BEGIN, END = "<!-- table: made by hippodrome.eval.report.cover -->\n", "<!-- end of table -->"
 
 
 def draw_cover(run: Path, name: str, path: Path) -> None:
-    """What the camera saw, the map made of it, and the same map with the road network, side by side. Raises HippodromeError."""
+    """Draw what the camera saw, the map made of it, and the same map with the road network, side by side.
+
+    Args:
+        run: Folder of a finished run.
+        name: The scenario's name.
+        path: The picture.
+
+    Raises:
+        HippodromeError: A file is missing or not readable, or one of the two maps failed.
+    """
     evidence = read_map_evidence(run / name / MAP_JSON)
     layers = {layer.name: layer for layer in evidence.methods}
     errors_m = {row.method: row.ape.mean_m for row in result_of(read_results(run / "results.json"), name).rows if row.ape}
@@ -64,7 +68,7 @@ def draw_cover(run: Path, name: str, path: Path) -> None:
 
 
 def _frames(path: Path, evidence: MapEvidence) -> Any:
-    """A few frames of the sheet, evenly over the drive, as one picture (RGB)."""
+    """A few frames of the sheet of thumbnails, spread evenly over the drive, as one RGB picture."""
     sheet = cv2.imread(str(path))
     if sheet is None:
         raise HippodromeError(f"{path}: no frames to show; run `hippodrome eval` again")
@@ -81,7 +85,7 @@ def _picture(axes: Axes, image: Any, title: str) -> None:
 
 
 def _map(axes: Axes, evidence: MapEvidence, title: str) -> None:
-    """The roads, and the way that was really driven."""
+    """Axes with the roads and the true path."""
     roads = [np.reshape(road, (-1, 2)) for road in evidence.roads]
     axes.add_collection(LineCollection(roads, colors=ROAD, linewidths=0.8, zorder=0))
     axes.plot(evidence.truth.x_m, evidence.truth.y_m, color=TRUTH, linewidth=0.7, zorder=2)
@@ -106,21 +110,20 @@ def _frameless(axes: Axes, title: str) -> None:
 
 
 def with_table(text: str, result: ScenarioResult, quoted: Sequence[Row]) -> str:
-    """A document with the part between the two marks made anew: a few columns of Table I, and the localization."""
+    """A document with the part between the two marks made anew: a few columns of Table I, and the localization error."""
     columns = [
         *(column for column in MAPPING_COLUMNS if column.title in ("Method", "CPU (%)", "APE (m)", "RPE (m)")),
         Column("Localization (m)", next(column.cell for column in LOCALIZATION_COLUMNS if column.title == "Error (m)")),
     ]
-    rows = [row_cells(columns, row) for row in (*result.rows, *quoted)]
-    lines = [" | ".join(column.title for column in columns), "---|" + "---:|" * (len(columns) - 1), *map(" | ".join, rows)]
-    table = "\n".join(f"| {line} |" if "---" not in line else f"|{line}" for line in lines)
+    rows = (row_cells(columns, row) for row in (*result.rows, *quoted))
+    table = "\n".join(markdown.table([column.title for column in columns], rows))
     before, rest = text.split(BEGIN, maxsplit=1)
     _, after = rest.split(END, maxsplit=1)
     return f"{before}{BEGIN}\n{table}\n\n{QUOTED_NOTE}.\n{END}{after}"
 
 
 def main(run: Path, name: str) -> None:
-    """Picture and table of one scenario of a run."""
+    """Make picture and table of one scenario of a run anew, in the working directory's docs and README."""
     draw_cover(run, name, PICTURE)
     result = result_of(read_results(run / "results.json"), name)
     write_atomically(README, with_table(README.read_text(encoding="utf-8"), result, quoted_rows()).encode())

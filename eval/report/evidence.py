@@ -13,27 +13,28 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from shapely import LineString
 
+from hippodrome._files import write_atomically
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.methods.materials import Materials, Scored, Topometric
+from hippodrome.eval.methods.materials import Materials, ScoredTrajectory, TopometricResult
+from hippodrome.eval.methods.method import Method
 from hippodrome.eval.metrics.alignment import apply_to_positions, find_alignment
 from hippodrome.eval.metrics.association import associate
 from hippodrome.eval.results.model import MAX_BYTES, ResultsError
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.recording import Recording
 
 MAP_JSON: Final = "map.json"
 THUMBNAILS: Final = "thumbnails.jpg"
-EVEN_FRAMES = 150  # one every 25 m of an hour's worth of town: a click finds a view of the same street
-WORST = 5  # places a method is worst at: what one reads before one looks for the cause
-APART = 10  # vertices (about 50 m) between two of them, so that they are different places
-TILE_WIDTH = 160
-COLUMNS = 12
-JPEG_QUALITY = 62  # about 3 kB a frame of 160 x 120
-TRUTH_STEP_S = 0.5  # a chord of at most 7 m, which no eye tells from the arc at town scale
-MARGIN_M = 60.0  # of road around the drive
-ROAD_TOLERANCE_M = 0.2  # below a pixel at the map's default zoom
-DECIMALS_M = 2
+EVEN_FRAMES = 150  # thumbnails spread evenly over the drive: one about every 50 m of the paper's, so in every street
+WORST = 5  # places per method at which it is worst, to be looked at first
+APART = 10  # vertices (about 50 m) between two worst places at least, so that they are different places
+TILE_WIDTH = 160  # pixels
+COLUMNS = 12  # of tiles in the sheet of thumbnails
+JPEG_QUALITY = 62  # takes about 3 kB per frame of 160 x 120
+TRUTH_STEP_S = 0.5  # between two points of the true path: chords of at most 7 m look like the arc in a map of a town
+MARGIN_M = 60.0  # roads are kept up to so far around the drive
+ROAD_TOLERANCE_M = 0.2  # by which centrelines are simplified: less than a pixel at the map's default zoom
+DECIMALS_M = 2  # of every number in the file
 
 
 class _Model(BaseModel):
@@ -49,45 +50,47 @@ class TimedPath(_Model):
 
 
 class Layer(TimedPath):
-    """A method's vertices, placed as they were for scoring; an error is None where no truth is near in time."""
+    """A method's vertices, placed as they were for scoring; an error is None where there is no truth at a vertex's time."""
 
-    name: str
+    name: str  # label of the method
     error_m: list[float | None]
-    worst: list[Annotated[int, Field(ge=0)]]  # vertices
+    worst: list[Annotated[int, Field(ge=0)]]  # vertices with the largest errors, largest first
 
 
 class LocalizedDrive(TimedPath):
-    """Where the localizer said it was, second by second, and whether it vouched for it."""
+    """Where the localizer said it was, once per second, and whether it declared itself localized."""
 
-    name: str
+    name: str  # label of the method in whose map the drive was localized
     error_m: list[float]
     localized: list[bool]
 
 
 class Thumbnails(_Model):
-    """Tiles of ``thumbnails.jpg``, row by row."""
+    """The tiles of ``thumbnails.jpg``, row by row."""
 
     t_s: list[float]
     columns: Annotated[int, Field(gt=0)]
-    width: Annotated[int, Field(gt=0)]
+    width: Annotated[int, Field(gt=0)]  # pixels of a tile
     height: Annotated[int, Field(gt=0)]
 
 
 class MapEvidence(_Model):
-    """``map.json``."""
+    """The content of ``map.json``."""
 
-    roads: list[list[float]]  # centrelines near the driven path, each x, y, x, y, ...
+    roads: list[list[float]]  # centrelines near the true path, each as x, y, x, y, ... in m
     truth: TimedPath
     methods: list[Layer]
     drives: list[LocalizedDrive]
     thumbnails: Thumbnails
     start: tuple[float, float, float]  # true pose of the first sample: m, m, degrees
-    recordings: dict[str, str]  # role: folder below ``recordings``
-    network: str  # file name
+    recordings: dict[str, str]  # folder below ``recordings`` of each role
+    network: str  # name of the network's file
 
 
-def write_map_evidence(materials: Materials, scored: Mapping[str, Scored], found: Mapping[str, Topometric]) -> None:
-    """Roads, the true path, every method's vertices with their errors, the localized drives, and frames along the way."""
+def write_map_evidence(
+    materials: Materials, scored: Mapping[Method, ScoredTrajectory], topometric: Mapping[Method, TopometricResult]
+) -> None:
+    """Write roads, the true path, every method's vertices with their errors, the localized drives, and frames along the way."""
     recording, truth = materials.mapping, materials.mapping.ground_truth()
     layers = [_layer(method, one, truth) for method, one in scored.items()]
     frames = _chosen_frames(recording, layers)
@@ -97,7 +100,7 @@ def write_map_evidence(materials: Materials, scored: Mapping[str, Scored], found
         roads=_roads(materials.roads, truth.poses),
         truth=_path(truth),
         methods=layers,
-        drives=[_drive(method, one) for method, one in found.items()],
+        drives=[_drive(method, result) for method, result in topometric.items()],
         thumbnails=Thumbnails(
             t_s=_rounded(_frame_times_s(recording)[frames]),
             columns=columns,
@@ -113,17 +116,24 @@ def write_map_evidence(materials: Materials, scored: Mapping[str, Scored], found
     write_atomically(materials.folder / MAP_JSON, f"{evidence.model_dump_json()}\n".encode())
 
 
-def add_layers(folder: Path, scored: Mapping[str, Scored], truth: Trajectory) -> None:
-    """More methods into the ``map.json`` of a scenario's folder, in place of those of the same name."""
+def add_layers(folder: Path, scored: Mapping[Method, ScoredTrajectory], truth: Trajectory) -> None:
+    """Add methods to the ``map.json`` of a scenario's folder; they replace those that are there already.
+
+    Args:
+        folder: The scenario's folder.
+        scored: The methods' trajectories and errors.
+        truth: The mapping drive's true trajectory.
+    """
     evidence = read_map_evidence(folder / MAP_JSON)
-    kept = [layer for layer in evidence.methods if layer.name not in scored]
+    added = {method.label for method in scored}
+    kept = [layer for layer in evidence.methods if layer.name not in added]
     layers = [*kept, *(_layer(method, one, truth) for method, one in scored.items())]
     text = evidence.model_copy(update={"methods": layers}).model_dump_json()
     write_atomically(folder / MAP_JSON, f"{text}\n".encode())
 
 
 def read_map_evidence(path: Path) -> MapEvidence:
-    """Read and validate. Raises ResultsError."""
+    """Read and validate ``map.json``. Raises ResultsError."""
     try:
         if (size := path.stat().st_size) > MAX_BYTES:
             raise ResultsError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
@@ -139,7 +149,13 @@ def read_map_evidence(path: Path) -> MapEvidence:
 
 
 def worst_places(errors_m: FloatArray, count: int = WORST, apart: int = APART) -> list[int]:
-    """Indices of the largest errors (N,), worst first, at least ``apart`` from one another; nan is no error."""
+    """Indices of the largest errors, largest first.
+
+    Args:
+        errors_m: Errors (N,); nan where there is none.
+        count: How many at most.
+        apart: Least difference of any two of the indices.
+    """
     left = np.where(np.isfinite(errors_m), errors_m, -np.inf)
     places: list[int] = []
     while len(places) < count and len(left) and np.max(left) > -np.inf:
@@ -149,26 +165,26 @@ def worst_places(errors_m: FloatArray, count: int = WORST, apart: int = APART) -
     return places
 
 
-def _layer(method: str, one: Scored, truth: Trajectory) -> Layer:
+def _layer(method: Method, one: ScoredTrajectory, truth: Trajectory) -> Layer:
     pairs = associate(one.trajectory, truth)
     placed_m = apply_to_positions(find_alignment(one.alignment, pairs.estimate, pairs.reference), one.trajectory.poses[:, :2])
     errors_m = np.full(len(one.trajectory.t_s), np.nan)
     errors_m[np.searchsorted(one.trajectory.t_s, one.ape.t_s)] = one.ape.errors_m
     return Layer(
-        name=method,
+        name=method.label,
         **_columns(one.trajectory.t_s, placed_m),
         error_m=[None if np.isnan(error) else round(float(error), DECIMALS_M) for error in errors_m],
         worst=worst_places(errors_m),
     )
 
 
-def _drive(method: str, one: Topometric) -> LocalizedDrive:
-    score = one.localized
+def _drive(method: Method, result: TopometricResult) -> LocalizedDrive:
+    score = result.localized
     seconds = np.unique(np.searchsorted(score.t_s, np.arange(score.t_s[0], score.t_s[-1], 1.0)))
-    at = {estimate.t_s: estimate.pose for estimate in one.localization.estimates}
+    at = {estimate.t_s: estimate.pose for estimate in result.localization.estimates}
     poses = np.array([at[float(t_s)] for t_s in score.t_s[seconds]])
     return LocalizedDrive(
-        name=method,
+        name=method.label,
         **_columns(score.t_s[seconds], poses),
         error_m=_rounded(score.errors_m[seconds]),
         localized=[bool(known) for known in score.localized[seconds]],
@@ -176,6 +192,7 @@ def _drive(method: str, one: Topometric) -> LocalizedDrive:
 
 
 def _roads(network: RoadNetwork, path_m: FloatArray) -> list[list[float]]:
+    """Simplified centrelines of the lanes around a path (N, 2 or more columns)."""
     low, high = path_m[:, :2].min(axis=0) - MARGIN_M, path_m[:, :2].max(axis=0) + MARGIN_M
     lines = (network.lane_points_m(lane) for lane in range(network.lane_count))
     near = (line for line in lines if np.all(line.max(axis=0) >= low) and np.all(line.min(axis=0) <= high))
@@ -201,7 +218,7 @@ def _frame_times_s(recording: Recording) -> FloatArray:
 
 
 def _chosen_frames(recording: Recording, layers: list[Layer]) -> list[int]:
-    """Frames spread evenly over the drive, and the one at each method's worst places."""
+    """Numbers of the frames spread evenly over the drive, and of the one nearest to each method's worst places."""
     times_s = _frame_times_s(recording)
     even = np.linspace(0, recording.frame_count - 1, EVEN_FRAMES).astype(int)
     worst_s = np.array([layer.t_s[vertex] for layer in layers for vertex in layer.worst])
@@ -211,7 +228,7 @@ def _chosen_frames(recording: Recording, layers: list[Layer]) -> list[int]:
 
 
 def _sheet(recording: Recording, frames: list[int]) -> tuple[NDArray[np.uint8], int]:
-    """All frames as tiles of one picture (RGB), row by row, and its number of columns."""
+    """The frames as tiles of one RGB picture, row by row, and the number of tiles in a row."""
     first = recording.frame(frames[0])
     height = max(round(TILE_WIDTH * first.shape[0] / first.shape[1]), 1)
     columns = min(COLUMNS, len(frames))

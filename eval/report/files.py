@@ -12,21 +12,18 @@ import cv2
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from hippodrome.eval.report.evidence import (
-    MAP_JSON,
-    THUMBNAILS,
-    MapEvidence,
-    read_map_evidence,
-)
+from hippodrome.eval.methods.method import REFINED
+from hippodrome.eval.report.evidence import MAP_JSON, THUMBNAILS, MapEvidence, read_map_evidence
 from hippodrome.eval.results.model import ResultsError
 from hippodrome.eval.results.ratios import RATIOS
-from hippodrome.eval.rivals.sequences import TABLE_TWO, SequenceRow
+from hippodrome.eval.results.table_two import TABLE_TWO, SequenceRow
 
-LOSSLESS_BYTES = 120_000  # beyond, a figure is mostly photographs, which lossless coding does not shrink
-PHOTO_QUALITY = 88
-LOSSLESS = 101  # OpenCV's way of saying so
+LOSSLESS_BYTES = 120_000  # a larger figure is mostly photographs, which lossless coding does not shrink
+PHOTO_QUALITY = 88  # of WebP, for those
+LOSSLESS = 101  # OpenCV codes WebP without loss if asked for a quality above 100
 
-CAPTIONS: Final = {  # in the order of the page; {} stands for the method
+# By a figure's stem, or by its end if that begins with "-": then {} is the method. In the order of the page.
+CAPTIONS: Final = {
     "maps": "Maps over ground truth (Fig. 3 B)",
     "semi-metric-map": "Semi-metric map as built, in map units (Fig. 3 A)",
     "errors": "Errors along the drive (Fig. 3 D–F)",
@@ -55,13 +52,17 @@ class ScenarioFiles:
 
     pictures: tuple[Picture, ...]
     evidence: MapEvidence | None
-    thumbnails: str | None  # data URI
-    sequences: tuple[SequenceRow, ...] = ()
-    ratios: Mapping[str, Any] = field(default_factory=dict)
+    thumbnails: str | None  # data URI of the sheet
+    sequences: tuple[SequenceRow, ...] = ()  # rows of Table II
+    ratios: Mapping[str, Any] = field(default_factory=dict)  # content of ratios.json
 
 
 def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
-    """Figures, map and frames below ``out / name``. A name that is no plain folder name has none."""
+    """The files below ``out / name``; a name that is no plain folder name has none.
+
+    Raises:
+        ResultsError: A file is there, but not readable.
+    """
     folder = out / name
     if Path(name).name != name or not folder.is_dir():
         return ScenarioFiles((), None, None)
@@ -85,11 +86,12 @@ def _parsed(path: Path, kind: Any) -> Any:
 
 
 def data_uri(media_type: str, content: bytes) -> str:
+    """Content as an address that holds it."""
     return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
 
 
 def _picture(path: Path) -> Picture | None:
-    """The figure as WebP, a third of the PNG's size; without loss where that is small already. None if it is no picture."""
+    """The figure as WebP, which takes a third of the PNG's size; without loss unless that is large. None if it is no picture."""
     image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
     if image is None:
         return None
@@ -101,6 +103,7 @@ def _picture(path: Path) -> Picture | None:
 
 
 def _kind(stem: str) -> str | None:
+    """The key of ``CAPTIONS`` that a figure's stem belongs to."""
     return next((key for key in CAPTIONS if stem == key or (key.startswith("-") and stem.endswith(key))), None)
 
 
@@ -113,5 +116,5 @@ def _caption(stem: str) -> str:
     kind = _kind(stem)
     if kind is None:
         return stem.replace("-", " ")
-    method = stem.removesuffix(kind)
-    return CAPTIONS[kind].format("topometric (paper)" if method == "topometric-paper" else method)
+    begin = stem.removesuffix(kind)
+    return CAPTIONS[kind].format(next((method.label for method in REFINED if method.stem == begin), begin))

@@ -1,4 +1,4 @@
-"""HTML that cannot be injected into: text is escaped unless it was made here."""
+"""HTML into which nothing can be injected: all text is escaped, except markup that was made here."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from pydantic import BaseModel
 
-VOID = frozenset({"img", "meta", "input", "br"})
+VOID = frozenset({"img", "meta", "input", "br"})  # elements without an end tag
 
 
 class Html(str):
@@ -21,7 +21,14 @@ Child: TypeAlias = "str | Html | Iterable[str | Html] | None"
 
 
 def element(tag: str, /, *children: Child, **attributes: str | int | bool | None) -> Html:
-    """One element. Attribute names lose a trailing ``_`` and read ``-`` for ``_``; False and None leave the attribute out."""
+    """One element.
+
+    Args:
+        tag: Its name.
+        *children: Its content.
+        **attributes: Its attributes; a trailing ``_`` of a name is dropped, any other stands for ``-``. False and None leave an
+            attribute out.
+    """
     start = f"<{tag}{''.join(_attribute(key, value) for key, value in attributes.items())}>"
     return Html(start if tag in VOID else f"{start}{joined(*children)}</{tag}>")
 
@@ -32,7 +39,7 @@ def joined(*children: Child) -> Html:
 
 
 def data_script(model: BaseModel) -> Html:
-    """A model as JSON for the page's own script; no text in it can end the element."""
+    """A model as JSON for the page's own script, in which no text can end the element."""
     text = model.model_dump_json()
     for character in "<>&":
         text = text.replace(character, f"\\u{ord(character):04x}")

@@ -1,4 +1,4 @@
-"""``report.html``: one file that holds everything a reader wants, made from ``results.json`` and the files beside it alone."""
+"""``report.html``: one file with everything that a reader wants, made from ``results.json`` and the files beside it alone."""
 
 from __future__ import annotations
 
@@ -6,28 +6,32 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
+from hippodrome._files import write_atomically
 from hippodrome.eval.report.files import read_scenario_files
 from hippodrome.eval.report.markup import Html, element, joined
 from hippodrome.eval.report.sections import scenario_section
 from hippodrome.eval.report.tables import anchor, overview
 from hippodrome.eval.results.model import Results, read_results
 from hippodrome.eval.results.paper_rows import quoted_rows
-from hippodrome.proto.atomic import write_atomically
 
 REPORT: Final = "report.html"
-# No address is ever asked for anything: pictures, style and script come from the file itself.
+# The page asks no server for anything: pictures, style and script are in the file itself.
 POLICY: Final = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
 
 def write_report(out: Path) -> Path:
-    """Write ``out/report.html`` from ``out/results.json``; the same files give the same bytes."""
+    """Write ``out/report.html`` from ``out/results.json``; returns its path. The same files give the same bytes.
+
+    Raises:
+        ResultsError: A file cannot be read.
+    """
     path = out / REPORT
     write_atomically(path, report_html(read_results(out / "results.json"), out).encode())
     return path
 
 
 def report_html(results: Results, out: Path) -> str:
-    """The page; figures, maps and frames are taken from below ``out`` where they exist."""
+    """The page. Figures, maps and frames are taken from below ``out`` as far as they exist. Raises ResultsError."""
     quoted = quoted_rows()
     sections = [
         scenario_section(place, scenario, quoted, read_scenario_files(out, scenario.name))

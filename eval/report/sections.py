@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import json
-import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from pydantic import ValidationError
 
-from hippodrome.eval.files.scenarios import PACKAGE
 from hippodrome.eval.report import comparison
+from hippodrome.eval.report.commands import command_lines
 from hippodrome.eval.report.evidence import MapEvidence
 from hippodrome.eval.report.files import Picture, ScenarioFiles
-from hippodrome.eval.report.markup import (
-    Child,
-    Html,
-    data_script,
-    element,
-    joined,
-)
+from hippodrome.eval.report.markup import Child, Html, data_script, element, joined
 from hippodrome.eval.report.tables import (
     anchor,
     break_table,
@@ -34,11 +27,18 @@ from hippodrome.eval.results.tables import definitions, failed_runs, scenario_ti
 from hippodrome.eval.results.thresholds import failed_limits
 from hippodrome.sim.scenario import Thresholds
 
-MEANING = {"cpu_s": "s of CPU", "step_ms": "ms a step"}
+MEANING = {"cpu_s": "s of CPU", "step_ms": "ms a step"}  # of a time, by the end of its name
 
 
 def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row], files: ScenarioFiles) -> Html:
-    """One scenario, from its verdict to how to run it again."""
+    """The section of one scenario, from its verdict to how to run it again.
+
+    Args:
+        place: Number of the scenario on the page, from 0.
+        scenario: Its result.
+        quoted: The paper's rows, which stand below ours.
+        files: What lies beside the results.
+    """
     rows = (*scenario.rows, *quoted)
     return element(
         "section",
@@ -98,13 +98,13 @@ def _failed_limits(scenario: ScenarioResult) -> list[str] | None:
 
 
 def _extra(scenario: ScenarioResult, name: str) -> dict[str, Any]:
-    """A field that results may have beside the agreed ones; empty if it is missing or something else."""
+    """A dictionary that results may have beside the agreed fields; empty if it is missing or something else."""
     value = getattr(scenario, name, None)
     return value if isinstance(value, dict) else {}
 
 
 def _headline(scenario: ScenarioResult) -> Html:
-    """A method in one tile, what the run is about first: its APE, and its localization where it has one."""
+    """One tile per method with its APE and its localization error, the last row first, as it is what a run is about."""
     return element("div", [_tile(row) for row in reversed(scenario.rows)], class_="tiles")
 
 
@@ -157,7 +157,7 @@ def _figure(picture: Picture) -> Html:
 
 
 def _timings(scenario: ScenarioResult) -> Html | None:
-    """CPU times with bars; those of a step have a scale of their own."""
+    """The times of the stages with bars, each as a share of the longest in the same unit."""
     figures = {name: float(value) for name, value in _extra(scenario, "timings").items() if isinstance(value, int | float)}
     rows: list[Sequence[Child]] = []
     for name, value in figures.items():
@@ -178,8 +178,8 @@ def _unit_of(name: str) -> tuple[str, str]:
 
 def _commands(scenario: ScenarioResult, evidence: MapEvidence | None) -> Html:
     """The command of each row, to be typed in the folder of the report."""
-    commands = list(_command_lines(scenario, evidence))
-    lines = [[method, element("code", _unbroken(command))] for method, command in commands]
+    commands = list(command_lines(scenario, evidence))
+    lines = [[name, element("code", _unbroken(command))] for name, command in commands]
     others = [row.method for row in scenario.rows if row.method not in dict(commands)]
     note = "In the folder that holds this report. Stages take the road network as it is; noise levels that survey it wrongly " \
            "(realistic, harsh) are reproduced by eval only."  # fmt: skip
@@ -190,50 +190,6 @@ def _commands(scenario: ScenarioResult, evidence: MapEvidence | None) -> Html:
 def _unbroken(command: str) -> list[Html]:
     """Words that browsers do not break at their hyphens."""
     return [joined(element("span", word), " ") for word in command.split(" ")]
-
-
-def _command_lines(scenario: ScenarioResult, evidence: MapEvidence | None) -> Iterator[tuple[str, str]]:
-    name = scenario.name
-    path = scenario.network.path
-    packaged = path is not None and path.startswith(PACKAGE)  # then the scenario itself finds it
-    network = ["--network", path if packaged else f"PATH/{path}"] if path else []
-    settings = ["--scenario", f"{name}/scenario.json"]
-    yield (
-        "all rows",
-        shlex.join(["hippodrome", "eval", f"{name}/scenario.json", *([] if packaged else network), "--out", "again"]),
-    )
-    if evidence is None or not {"mapping", "localization"} <= set(evidence.recordings):
-        return
-    roads = network or ["--network", f"towns/{evidence.network}"]
-    mapping, drive = (f"recordings/{evidence.recordings[role]}" for role in ("mapping", "localization"))
-    yield "semi-metric", shlex.join(["hippodrome", "map", mapping, *settings, "--out", "semi-metric.pbstream"])
-    for row in scenario.rows:
-        if not row.method.startswith("topometric"):
-            continue
-        mode = "paper" if row.method.endswith("(paper)") else "route"
-        start = ["--start=" + ",".join(f"{value:.6f}" for value in evidence.start)] if mode == "paper" else []
-        refined = f"topometric-{'paper' if mode == 'paper' else 'default'}.pbstream"
-        yield (
-            row.method,
-            shlex.join(
-                [
-                    "hippodrome",
-                    "refine",
-                    f"{name}/semi-metric.pbstream",
-                    *roads,
-                    "--mode",
-                    mode,
-                    *start,
-                    *settings,
-                    "--out",
-                    refined,
-                ]
-            ),
-        )
-        yield (
-            f"{row.method}, localization",
-            shlex.join(["hippodrome", "localize", f"{name}/{refined}", drive, *roads, *settings, "--out", f"{mode}.tum"]),
-        )
 
 
 def _configuration(scenario: ScenarioResult) -> Html:

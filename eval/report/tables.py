@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hippodrome.eval.methods.method import method_of
 from hippodrome.eval.report.evidence import Layer, MapEvidence
-from hippodrome.eval.report.markup import (
-    Child,
-    Html,
-    element,
-    joined,
-)
+from hippodrome.eval.report.markup import Child, Html, element, joined
 from hippodrome.eval.results.model import Results, Row, ScenarioResult
 from hippodrome.eval.results.tables import (
     LOCALIZATION_COLUMNS,
@@ -32,14 +28,20 @@ def scrolling(table: Html, label: str) -> Html:
 
 
 def plain_table(heads: Sequence[str], rows: Sequence[Sequence[Child]], label: str) -> Html:
-    """First column to the left, figures to the right."""
+    """A table with the first column to the left and the others to the right; ``label`` names it for screen readers."""
     head = element("tr", [element("th", title, scope="col") for title in heads])
     body = [element("tr", element("th", row[0], scope="row"), [element("td", cell) for cell in row[1:]]) for row in rows]
     return scrolling(element("table", element("thead", head), element("tbody", body)), label)
 
 
 def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Sequence[Child]], label: str) -> Html:
-    """A plain table whose columns stand under a common head where they show the same figure; a lone column has no second head."""
+    """A plain table with two rows of headings: one above groups of columns that show the same figure, one above each column.
+
+    Args:
+        groups: Heading of each group, and the headings of its columns; none for a group of one column, whose heading spans both.
+        rows: The cells.
+        label: Names the table for screen readers.
+    """
     top, below = [], []
     for title, heads in groups:
         spans: dict[str, str | int] = {"colspan": len(heads), "scope": "colgroup"} if heads else {"rowspan": 2, "scope": "col"}
@@ -51,7 +53,7 @@ def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Se
 
 
 def overview(results: Results, quoted: Sequence[Row]) -> Html:
-    """One line a scenario: APE of every method, and how the second drive was localized; the paper's figures below."""
+    """One line per scenario: APE of every method, and how the second drive was localized; the paper's figures below."""
     measured = list(dict.fromkeys(row.method for scenario in results.scenarios for row in scenario.rows))[::-1]  # ours first
     localizing = [method for method in measured if any(_located(_row(one, method)) for one in results.scenarios)]
     groups: list[tuple[str, Sequence[str]]] = [("Scenario", ()), ("Mean APE of the map (m)", measured)]
@@ -73,7 +75,7 @@ def overview(results: Results, quoted: Sequence[Row]) -> Html:
 
 
 def anchor(place: int) -> str:
-    """A scenario's place on the page; its name may hold anything."""
+    """The id of a scenario's section. It is made of its number, as its name may hold anything."""
     return f"scenario-{place + 1}"
 
 
@@ -83,14 +85,14 @@ def mapping_table(scenario: ScenarioResult, quoted: Sequence[Row]) -> Html:
 
 
 def localization_table(scenario: ScenarioResult, quoted: Sequence[Row]) -> Html | None:
-    """Localization from an unknown start (the paper's Table II)."""
+    """Localization from an unknown start (the paper's Table II); None if nothing was localized."""
     rows = [row for row in (*scenario.rows, *quoted) if row.localization is not None]
     return _row_table(LOCALIZATION_COLUMNS, rows, f"{scenario.name}: localization") if rows else None
 
 
 def worst_places(evidence: MapEvidence, with_frames: bool) -> Html:
-    """Where each metric method is worst, with what the camera saw there; the button shows it on the map."""
-    layers = [layer for layer in evidence.methods if layer.name.startswith("topometric")]
+    """Where each method in the network's frame is worst, and what the camera saw there; buttons show the places on the map."""
+    layers = [layer for layer in evidence.methods if method_of(layer.name).frame == "network"]
     return joined([_worst_of(layer, evidence, with_frames) for layer in layers])
 
 
@@ -109,7 +111,7 @@ def _worst_card(layer: Layer, vertex: int, evidence: MapEvidence, with_frames: b
 
 
 def frame_tile(evidence: MapEvidence, t_s: float) -> Html:
-    """The embedded frame nearest in time, cut out of the sheet of all."""
+    """The embedded frame nearest to a time, cut out of the sheet."""
     times, columns = evidence.thumbnails.t_s, evidence.thumbnails.columns
     tile = min(range(len(times)), key=lambda place: abs(times[place] - t_s))
     return element("div", class_="tile", role="img", aria_label=FRAME_LABEL.format(times[tile]),
@@ -117,7 +119,7 @@ def frame_tile(evidence: MapEvidence, t_s: float) -> Html:
 
 
 def break_table(scenario: ScenarioResult) -> Html | None:
-    """Stretches that the road match does not vouch for, and why."""
+    """Stretches of vertices that the road match does not vouch for, and why; None if there are none."""
     rows = [
         [row.method, f"{one.get('first_vertex')}–{one.get('last_vertex')}", _words(one.get("status")), str(one.get("cause"))]
         for row in scenario.rows
@@ -147,7 +149,7 @@ def _located(row: Row | None) -> bool:
 
 
 def _dictionaries(value: object) -> list[dict[str, object]]:
-    """What of a field beside the agreed ones has the form that it should have."""
+    """The dictionaries in a field of a row that is not one of the agreed ones, and so may be anything."""
     return [one for one in value if isinstance(one, dict)] if isinstance(value, list | tuple) else []
 
 

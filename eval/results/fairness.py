@@ -2,31 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
+
+from hippodrome.eval.methods.method import (
+    DEAD_RECKONING,
+    NO_ATTRACTOR,
+    ORBSLAM3,
+    RATSLAM,
+    SEMI_METRIC,
+    TOPOMETRIC,
+    TOPOMETRIC_PAPER,
+    method_of,
+)
 
 HEAD: Final = ("Method", "Is given", "Frame of its APE", "What favours or burdens it")
 
-# Keyed by the method's name, that of both trajectories of the tracker being one.
+# By the label of the method, or of the system that it is a variant of: both trajectories of ORB-SLAM3 have one entry.
 GIVEN: Final[dict[str, tuple[str, str, str]]] = {
-    "dead reckoning": ("self-motion", "start pose, no scale", "no frame, no map: what the others begin with"),
-    "semi-metric": (
+    DEAD_RECKONING.label: ("self-motion", "start pose, no scale", "no frame, no map: what the others begin with"),
+    SEMI_METRIC.label: (
         "frames of one small camera, self-motion",
         "start pose, no scale",
         "its shape is right, its metres are not",
     ),
-    "RatSLAM": ("the same", "start pose, no scale", "constants of OpenRatSLAM, not tuned to these towns"),
-    "semi-metric, no attractor": ("the same", "start pose, no scale", "the semi-metric map's poses to the last bit"),
-    "topometric (paper)": (
+    RATSLAM.label: ("the same", "start pose, no scale", "constants of OpenRatSLAM, not tuned to these towns"),
+    NO_ATTRACTOR.label: ("the same", "start pose, no scale", "the semi-metric map's poses to the last bit"),
+    TOPOMETRIC_PAPER.label: (
         "the same, the road network, the start pose",
         "network, no alignment",
         "the network is metric and drawn from the truth, wheels and gyro bridge what the camera misses; no alignment helps it",
     ),
-    "topometric": (
+    TOPOMETRIC.label: (
         "the same, the road network",
         "network, no alignment",
         "the network is metric and drawn from the truth, wheels and gyro bridge what the camera misses; no alignment helps it",
     ),
-    "ORB-SLAM3": (
+    ORBSLAM3.label: (
         "640x480 pairs of two cameras, their baseline in metres; no self-motion, no road network",
         "best rigid fit, SE(2)",
         "scale from the pair, sixteen times the pixels, surfaces drawn with the grain that corners need, the best alignment; "
@@ -36,7 +48,7 @@ GIVEN: Final[dict[str, tuple[str, str, str]]] = {
 }
 
 
-def fairness_rows(methods: list[str]) -> list[list[str]]:
-    """A line for each of these methods of a results file, each once."""
-    names = dict.fromkeys("ORB-SLAM3" if method.startswith("ORB-SLAM3") else method for method in methods)
+def fairness_rows(labels: Iterable[str]) -> list[list[str]]:
+    """One row per method or system among these labels of a results file, in the columns of ``HEAD``."""
+    names = dict.fromkeys(method.system or method.label for method in map(method_of, labels))
     return [[name, *GIVEN[name]] for name in names if name in GIVEN]

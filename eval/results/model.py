@@ -8,13 +8,13 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.metrics.localization import LocalizationScore
 from hippodrome.eval.metrics.trajectory import Score
-from hippodrome.proto.atomic import write_atomically
 
-DECIMALS = 6  # micrometres and nanoseconds: below any meaning, above rounding noise between machines
-MAX_BYTES = 64 << 20
+DECIMALS: Final = 6  # of every number: finer than any figure means, coarser than the rounding in which machines differ
+MAX_BYTES: Final = 64 << 20  # of a file that is read: far more than any run writes
 TIMING_FIELDS: Final = frozenset({"cpu_percent", "peak_rss_bytes", "initial_time_ms", "timings"})
 
 
@@ -23,18 +23,22 @@ class ResultsError(HippodromeError):
 
 
 class _Model(BaseModel):
+    """Unknown fields are kept: the file may be of a later version."""
+
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
 
 class Network(_Model):
-    path: str | None = None  # a network file, or
-    generator: str | None = None  # the kind of generated town
-    edges: int
-    km: float
+    """The road network that was driven: either a file or a generated town."""
+
+    path: str | None = None  # name of the network file
+    generator: str | None = None  # kind of the generated town
+    edges: int  # directed
+    km: float  # of road, each direction counted
 
 
 class ErrorSummary(_Model):
-    """A ``Score`` in figures. Quoted ones know their mean only."""
+    """The figures of a ``Score``. Those that are quoted from a paper have a mean only."""
 
     definition: str
     mean_m: float
@@ -48,7 +52,7 @@ class ErrorSummary(_Model):
 
 
 class LocalizationSummary(_Model):
-    """A ``LocalizationScore`` in figures; None where it never localized, or was not printed."""
+    """The figures of a ``LocalizationScore``. None where the drive was never localized, or a paper does not print the figure."""
 
     definition: str
     success: bool | None = None
@@ -73,12 +77,12 @@ class LocalizationSummary(_Model):
 class Row(_Model):
     """One method on one drive. A method that failed has a row too, and says why."""
 
-    method: str
+    method: str  # label of the method, see ``eval.methods.method``
     quoted: bool = False  # copied from a paper, not measured here
-    failure: str | None = None
-    cpu_percent: float | None = None  # process CPU time / duration of the drive
-    map_bytes: int | None = None
-    peak_rss_bytes: int | None = None  # of a process of its own, all of it
+    failure: str | None = None  # why it failed, if it did
+    cpu_percent: float | None = None  # CPU time of the process, in per cent of the drive's duration
+    map_bytes: int | None = None  # size of the saved map
+    peak_rss_bytes: int | None = None  # most memory of a process that does nothing but run the method
     camera_frames: int | None = None
     keyframes: int | None = None
     vertices: int | None = None
@@ -86,23 +90,32 @@ class Row(_Model):
     ape: ErrorSummary | None = None
     ape_se2: ErrorSummary | None = None
     ape_sim2: ErrorSummary | None = None
-    rpe: ErrorSummary | None = None  # consecutive vertices
+    rpe: ErrorSummary | None = None  # between consecutive vertices
     rpe_20m: ErrorSummary | None = None
     localization: LocalizationSummary | None = None
 
 
 class ScenarioResult(_Model):
+    """All methods on one scenario, and what the scenario was."""
+
     name: str
     seed: int
     network: Network
-    noise: str
-    frames: int
-    duration_s: float
+    noise: str  # level of the self-motion's noise
+    frames: int  # of the mapping drive
+    duration_s: float  # of the mapping drive
     rows: tuple[Row, ...]
 
 
 class Results(_Model):
+    """The whole file."""
+
     scenarios: tuple[ScenarioResult, ...]
+
+
+def result_of(results: Results, name: str) -> ScenarioResult:
+    """The result of the scenario ``name``, which must be there."""
+    return next(result for result in results.scenarios if result.name == name)
 
 
 def summarize(score: Score) -> ErrorSummary:
@@ -117,12 +130,12 @@ def summarize_localization(score: LocalizationScore) -> LocalizationSummary:
 
 
 def write_results(path: Path, results: Results) -> None:
-    """Write atomically; the same results give the same bytes."""
+    """Write ``results.json`` atomically; the same results give the same bytes. Raises ResultsError."""
     write_atomically(path, to_json(results.model_dump(mode="python"), str(path)).encode())
 
 
 def read_results(path: Path) -> Results:
-    """Read and validate; the error names file, field and reason."""
+    """Read and validate ``results.json``. Raises ResultsError, which names the file, the field and the reason."""
     try:
         if (size := path.stat().st_size) > MAX_BYTES:
             raise ResultsError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
@@ -136,25 +149,33 @@ def read_results(path: Path) -> Results:
 
 
 def without_timings(results: Results) -> dict[str, Any]:
-    """Everything that the seed determines, as plain data: for comparing runs byte by byte with ``to_json``."""
-    kept = _dropped(results.model_dump(mode="python"))
+    """Everything that the seed determines, as plain data: what two runs are compared by, byte by byte with ``to_json``."""
+    kept = _without_timings(results.model_dump(mode="python"))
     assert isinstance(kept, dict)
     return kept
 
 
 def to_json(data: Any, name: str = "results") -> str:
-    """Sorted keys, fixed rounding, no NaN."""
+    """Plain data as JSON, with sorted keys and all numbers rounded to ``DECIMALS``.
+
+    Args:
+        data: Dictionaries, lists and plain values.
+        name: What an error calls the data.
+
+    Raises:
+        ResultsError: A value is not finite, or is none that JSON has.
+    """
     try:
         return json.dumps(_rounded(data), indent=2, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n"
     except (TypeError, ValueError) as error:
         raise ResultsError(f"{name}: cannot be written as JSON: {error}") from error
 
 
-def _dropped(value: Any) -> Any:
+def _without_timings(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _dropped(item) for key, item in value.items() if key not in TIMING_FIELDS}
+        return {key: _without_timings(item) for key, item in value.items() if key not in TIMING_FIELDS}
     if isinstance(value, list | tuple):
-        return [_dropped(item) for item in value]
+        return [_without_timings(item) for item in value]
     return value
 
 

@@ -9,13 +9,13 @@ import numpy as np
 from hippodrome.eval.results.model import ErrorSummary, LocalizationSummary, Row
 
 SOURCE: Final = "Li et al. 2025"
-MEGABYTE = 1_000_000  # the paper's "M"
+MEGABYTE: Final = 1_000_000  # bytes; the paper writes "M"
 
 ORB_SLAM3: Final = "ORB-SLAM3 (Binocular)"
 TOPOMETRIC: Final = "Topometric map (Mono, ours)"
 SEMI_METRIC: Final = "Semi-metric map (Mono)"
 
-# Table II, sequences 1 to 10
+# Table II, sequences 1 to 10, under the paper's names of the methods
 SEQUENCE_LENGTH_M: Final = (372.7, 804.3, 170.0, 732.6, 812.7, 1485.3, 559.0, 294.2, 1423.9, 830.9)
 INITIAL_TIME_MS: Final = {
     ORB_SLAM3: (794.0, 1058.0, 1077.0, 978.0, 1104.0, 1171.0, 1176.0, 894.0, 993.0, 1064.0),
@@ -28,7 +28,7 @@ LOCALIZATION_ERROR_M: Final = {
 
 
 def quoted_rows() -> tuple[Row, ...]:
-    """Table I as printed, with the means over the ten sequences of Table II."""
+    """The rows of Table I as printed, with the means over the ten sequences of Table II."""
     return (
         _quoted(SEMI_METRIC, 1.3, 56.1, 121.2, 9.4, vertices=1417, edges=1567),
         _quoted(ORB_SLAM3, 40.57, 259.0, 3.86, 0.96, camera_frames=14717, keyframes=715),

@@ -1,40 +1,39 @@
-"""Tables I and II as Markdown and on the terminal, from ``Results`` alone. Quoted rows are marked, failures keep their row."""
+"""Table I and the localization table, as Markdown and on the terminal, from ``Results`` alone.
+
+Rows that are quoted from the paper are marked, and a method that failed keeps its row.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Final
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from hippodrome.eval.results.model import (
-    ErrorSummary,
-    Results,
-    Row,
-    ScenarioResult,
-)
+from hippodrome.eval.results import markdown
+from hippodrome.eval.results.model import ErrorSummary, Results, Row, ScenarioResult
 
-QUOTED_MARK = "†"
-QUOTED_NOTE = f"{QUOTED_MARK} quoted from the paper, another drive in another simulator; not measured here"
-NONE = "-"
-MEGABYTE = 1e6
-LEAST = 0.001  # the smallest figure that a table writes out
-
-Cell: TypeAlias = Callable[[Row], str]
+QUOTED_MARK: Final = "†"
+QUOTED_NOTE: Final = f"{QUOTED_MARK} quoted from the paper, another drive in another simulator; not measured here"
+NONE: Final = "-"
+MEGABYTE: Final = 1e6
+LEAST: Final = 0.001  # a smaller figure is written as "<0.001"
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
+    """A column of a table: its heading, and what it says of a row."""
+
     title: str
-    cell: Cell
+    cell: Callable[[Row], str]
 
 
 def _figure(value: float | None, digits: int = 2) -> str:
-    """A number with ``digits`` decimals; a smaller one with one significant digit, down to what no reader needs."""
+    """A number with ``digits`` decimals, or with one significant digit if it would be zero otherwise."""
     if value is None:
         return NONE
     if value == 0.0 or abs(value) >= 10.0**-digits:
@@ -70,22 +69,25 @@ def _localization(row: Row, figure: Callable[..., str], field: str) -> str:
 
 
 def _runs(row: Row) -> str:
-    """Lowest and highest mean of a method that is not deterministic, and how many of its runs came to nothing."""
-    spread = (row.model_extra or {}).get("ape_spread_m")
-    if not spread:
+    """Of a method that is run several times: the lowest and the highest mean APE, and how many of the runs failed."""
+    spread_m = (row.model_extra or {}).get("ape_spread_m")
+    if not spread_m:
         return NONE
-    lost, runs = len(failed_runs([row])), len((row.model_extra or {}).get("runs", ()))
-    return " to ".join(_figure(float(value)) for value in spread) + (f" ({lost} of {runs} failed)" if lost else "")
+    failed, runs = len(failed_runs([row])), len((row.model_extra or {}).get("runs", ()))
+    return " to ".join(_figure(float(value)) for value in spread_m) + (f" ({failed} of {runs} failed)" if failed else "")
 
 
 def failed_runs(rows: Sequence[Row]) -> list[str]:
-    """What became of the runs that rows rest on in part only, a line each; a row that rests on none of them failed itself."""
-    holders: dict[tuple[str, str], list[str]] = {}
+    """Why runs failed whose row has figures all the same, from the other runs; one line per run.
+
+    A row of which all runs failed is a failure itself, and is not listed here.
+    """
+    methods_of: dict[tuple[str, str], list[str]] = {}
     for row in rows:
         for run in (row.model_extra or {}).get("runs", ()) if row.failure is None else ():
             if run.get("failure") is not None:
-                holders.setdefault((str(run["run"]), str(run["failure"])), []).append(row.method)
-    return [f"{', '.join(methods)}, {run}: {failure}" for (run, failure), methods in holders.items()]
+                methods_of.setdefault((str(run["run"]), str(run["failure"])), []).append(row.method)
+    return [f"{', '.join(methods)}, {run}: {failure}" for (run, failure), methods in methods_of.items()]
 
 
 def _success(row: Row) -> str:
@@ -128,18 +130,23 @@ def _percent(share: float | None) -> str:
 
 
 def table_one_markdown(results: Results, quoted: Sequence[Row] = ()) -> str:
-    """Per scenario: the mapping table (the paper's Table I) and the localization table, with every definition beneath."""
+    """Per scenario, the mapping table (the paper's Table I) and the localization table, with all definitions below.
+
+    Args:
+        results: The results.
+        quoted: Rows of the paper, which stand below ours in each table.
+    """
     return "\n".join(_scenario_markdown(scenario, quoted) for scenario in results.scenarios)
 
 
 def _short(value: float | None) -> str:
-    """Three digits: a terminal is narrow."""
+    """A number with three digits, as a terminal is narrow."""
     if value is None:
         return NONE
     return f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
 
 
-TERMINAL_COLUMNS = (  # fit 80 characters; table1.md has the rest
+TERMINAL_COLUMNS = (  # they fit 80 characters; table1.md has the rest
     Column("CPU %", lambda row: _short(row.cpu_percent)),
     Column("MB", lambda row: NONE if row.map_bytes is None else _short(row.map_bytes / MEGABYTE)),
     Column("APE m", lambda row: NONE if row.ape is None else _short(row.ape.mean_m)),
@@ -157,7 +164,7 @@ TERMINAL_NOTE = (
 
 
 def print_table_one(results: Results, quoted: Sequence[Row], console: Console) -> None:
-    """A narrow table per scenario, the quoted rows once, failures beneath."""
+    """Print a narrow table per scenario with its failures below, and one of the paper's rows."""
     for scenario in results.scenarios:
         console.print(_terminal_table(scenario_title(scenario), scenario.rows))
         for row in scenario.rows:
@@ -181,7 +188,7 @@ def _terminal_table(title: str, rows: Sequence[Row]) -> Table:
 
 
 def scenario_title(scenario: ScenarioResult) -> str:
-    """What was driven, in one line."""
+    """What was driven, in one line: the network, its length, seed and noise, the number of frames and the duration."""
     network = scenario.network
     source = network.path if network.path is not None else f"generated, {network.generator}"
     return (
@@ -191,41 +198,19 @@ def scenario_title(scenario: ScenarioResult) -> str:
 
 
 def definitions(rows: Sequence[Row]) -> list[str]:
-    """What each kind of figure in these rows means, each wording once, with the methods that it holds for."""
-    holders: dict[tuple[str, str], list[str]] = {}
+    """What the figures in these rows mean: one line per definition, with the methods that it holds for."""
+    methods_of: dict[tuple[str, str], list[str]] = {}
     for row in rows:
         for title, field in (("APE", row.ape), ("RPE", row.rpe), ("RPE 20 m", row.rpe_20m), ("APE Sim(2)", row.ape_sim2)):
             if field is not None:
-                holders.setdefault((title, field.definition), []).append(_method(row))
+                methods_of.setdefault((title, field.definition), []).append(_method(row))
         if row.localization is not None:
-            holders.setdefault(("Localization", row.localization.definition), []).append(_method(row))
-    return [f"{title} ({', '.join(methods)}): {definition}" for (title, definition), methods in sorted(holders.items())]
-
-
-def _scenario_markdown(scenario: ScenarioResult, quoted: Sequence[Row]) -> str:
-    rows = (*scenario.rows, *quoted)
-    parts = [f"## {_escaped(scenario_title(scenario))}", "", _markdown_table(MAPPING_COLUMNS, rows), ""]
-    if located := _with_localization(rows):
-        parts += ["### Localization from an unknown start", "", _markdown_table(LOCALIZATION_COLUMNS, located), ""]
-    failures = [f"- {_escaped(row.method)}: FAILED: {_escaped(row.failure)}" for row in rows if row.failure is not None]
-    failures += [f"- {_escaped(line)}" for line in failed_runs(rows)]
-    notes = [f"- {_escaped(line)}" for line in definitions(rows)]
-    mark = [f"- {QUOTED_NOTE}"] if any(row.quoted for row in rows) else []
-    return "\n".join([*parts, *failures, *notes, *mark, ""])
-
-
-def _with_localization(rows: Sequence[Row]) -> list[Row]:
-    return [row for row in rows if row.localization is not None]
-
-
-def _markdown_table(columns: Sequence[Column], rows: Sequence[Row]) -> str:
-    columns = filled_columns(columns, rows)
-    lines = [[column.title for column in columns], ["---", *["---:"] * (len(columns) - 1)]]
-    lines += [[_escaped(text) for text in row_cells(columns, row)] for row in rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+            methods_of.setdefault(("Localization", row.localization.definition), []).append(_method(row))
+    return [f"{title} ({', '.join(methods)}): {definition}" for (title, definition), methods in sorted(methods_of.items())]
 
 
 def row_cells(columns: Sequence[Column], row: Row) -> list[str]:
+    """What the columns say of a row; its first cell, the method's name, also says if the method failed."""
     cells = [column.cell(row) for column in columns]
     return cells if row.failure is None else [f"{cells[0]} (FAILED)", *cells[1:]]
 
@@ -235,5 +220,18 @@ def filled_columns(columns: Sequence[Column], rows: Sequence[Row]) -> list[Colum
     return [column for column in columns if any(column.cell(row) != NONE for row in rows)]
 
 
-def _escaped(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", " ")
+def _scenario_markdown(scenario: ScenarioResult, quoted: Sequence[Row]) -> str:
+    rows = (*scenario.rows, *quoted)
+    parts = [f"## {markdown.escaped(scenario_title(scenario))}", "", *_table(MAPPING_COLUMNS, rows), ""]
+    if localizing := [row for row in rows if row.localization is not None]:
+        parts += ["### Localization from an unknown start", "", *_table(LOCALIZATION_COLUMNS, localizing), ""]
+    lines = [f"{row.method}: FAILED: {row.failure}" for row in rows if row.failure is not None]
+    notes = [f"- {markdown.escaped(line)}" for line in (*lines, *failed_runs(rows), *definitions(rows))]
+    mark = [f"- {QUOTED_NOTE}"] if any(row.quoted for row in rows) else []
+    return "\n".join([*parts, *notes, *mark, ""])
+
+
+def _table(columns: Sequence[Column], rows: Sequence[Row]) -> list[str]:
+    columns = filled_columns(columns, rows)
+    cells = ([markdown.escaped(text) for text in row_cells(columns, row)] for row in rows)
+    return markdown.table([column.title for column in columns], cells, spaced=True)

@@ -7,7 +7,12 @@ from hippodrome.sim.scenario import Thresholds
 
 
 def failed_limits(limits: Thresholds, result: ScenarioResult) -> list[str]:
-    """One line per limit that does not hold; a figure that is missing fails its limit."""
+    """One line per limit that does not hold; a limit whose figure is missing does not hold.
+
+    Args:
+        limits: The scenario's limits, and the label of the method that they are for.
+        result: The scenario's result.
+    """
     row = next((row for row in result.rows if row.method == limits.method and not row.quoted), None)
     if row is None:
         return [f"no row '{limits.method}'"]
@@ -29,5 +34,6 @@ def failed_limits(limits: Thresholds, result: ScenarioResult) -> list[str]:
 
 
 def _success(limits: Thresholds, row: Row) -> list[str]:
+    """The limit that the second drive must have been localized at all."""
     succeeded = row.localization is not None and row.localization.success
     return [f"{row.method}: never localized"] if limits.localization_success and not succeeded else []

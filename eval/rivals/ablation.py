@@ -1,4 +1,4 @@
-"""The mapper without its attractor networks: what they cost is the difference, what they are for is localization."""
+"""The mapper without its attractor networks. What they cost is the difference; what they are for is localization."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hippodrome.core.types import Observation
 
 
 class MapperWithoutAttractor(Mapper):
-    """The mapper whose head-direction and grid cells are left out."""
+    """The mapper with head-direction and grid cells left out: all that drives them or reads them does nothing."""
 
     def _integrate_paths(self, observation: Observation) -> None:
         pass

@@ -1,8 +1,8 @@
-"""A method alone in its process, as ORB-SLAM3 is: observations come through a pipe, no simulator is loaded.
+"""A method alone in its process, as ORB-SLAM3 is: observations come through a pipe, and no simulator is loaded.
 
     python -m hippodrome.eval.rivals.lean < JOB AND OBSERVATIONS
 
-Standard input: a pickled ``Job``, then pickled observations until the end. Prints the most memory [bytes] the process ever held.
+Standard input: a pickled ``Job``, then pickled observations until the end. Prints the most memory [bytes] that the process held.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Job:
 
 
 def main() -> None:
-    """Build, refine, report."""
+    """Run the job on all observations of standard input and print the most memory [bytes] that the process held."""
     stream = sys.stdin.buffer
     job: Job = pickle.load(stream)
     builder = _builder(job)

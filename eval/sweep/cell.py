@@ -14,19 +14,20 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from hippodrome.core.types import Trajectory
-from hippodrome.eval.evaluate import MODES, EvaluationTask, evaluate_scenario
+from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.files.trajectories import read_tum
-from hippodrome.eval.methods.materials import file_stem, score_trajectory
+from hippodrome.eval.methods.materials import score_trajectory
+from hippodrome.eval.methods.method import method_of
 from hippodrome.eval.metrics.association import associate
 from hippodrome.eval.metrics.localization import FALSE_FIX_M
 from hippodrome.eval.metrics.trajectory import Score
 from hippodrome.eval.results.model import Row, ScenarioResult
 from hippodrome.eval.sweep.executors import SweepError
-from hippodrome.eval.sweep.grid import Cell, code_sha256
+from hippodrome.eval.sweep.grid import SweepCell, cell_code_sha256
 from hippodrome.sim.record import RecordingPlan, Role, close_renderer, record
 
 ROLES: Final[tuple[Role, ...]] = ("mapping", "localization")
-SHARED: Final = ("recordings", "towns")  # cells that drive alike drive once
+SHARED: Final = ("recordings", "towns")  # folders that all cells share, so that cells that drive alike drive once
 
 _one_at_a_time = threading.Lock()  # SUMO and GL keep one state per process, and a cluster's worker may run several threads
 
@@ -54,28 +55,28 @@ class CellResult(BaseModel):
 
     parameters: dict[str, str]
     result: ScenarioResult
-    samples: dict[str, dict[str, Samples]]  # method, then ape, rpe, rpe_20m, localization
+    samples: dict[str, dict[str, Samples]]  # by method, then by figure: ape, rpe, rpe_20m, localization
 
 
 @dataclass(frozen=True, slots=True)
 class RecordingTask:
-    """The two drives that one or more cells need."""
+    """A drive that one or more cells need, and the code that is to make it."""
 
     plan: RecordingPlan
-    code: str
+    code: str  # hash of the code of the process that hands out the tasks
 
 
 @dataclass(frozen=True, slots=True)
 class CellTask:
-    """A cell, the sweep's folder, and the code that its results are to come from."""
+    """A cell, the sweep's folder, and the code that the results are to come from."""
 
-    cell: Cell
+    cell: SweepCell
     out: Path
-    code: str
+    code: str  # hash of the code of the process that hands out the tasks
 
 
 def make_recording(task: RecordingTask) -> str:
-    """Record one drive unless it is on disk; its folder."""
+    """Record one drive unless it is on disk; the recording's folder."""
     _require_same_code(task.code)
     with _one_at_a_time, _locked(task.plan):
         try:
@@ -85,7 +86,7 @@ def make_recording(task: RecordingTask) -> str:
 
 
 def run_cell(task: CellTask) -> CellResult:
-    """Evaluate a cell into its folder. On a machine that does not share the sweep's folder, recordings are made there."""
+    """Evaluate a cell into its folder. A machine that does not share the sweep's folder makes the recordings that it needs."""
     _require_same_code(task.code)
     for role in ROLES:
         make_recording(RecordingTask(RecordingPlan(task.cell.scenario, role, task.out), task.code))
@@ -102,15 +103,16 @@ def run_cell(task: CellTask) -> CellResult:
 
 
 def _require_same_code(code: str) -> None:
-    if code_sha256() != code:
+    """Raise SweepError if this process, on whatever machine, runs other code than the one that hands out the tasks."""
+    if cell_code_sha256() != code:
         raise SweepError(
-            f"a worker runs other code ({code_sha256()}) than this command ({code}); install the same on all machines"
+            f"a worker runs other code ({cell_code_sha256()}) than this command ({code}); install the same on all machines"
         )
 
 
 @contextmanager
 def _locked(plan: RecordingPlan) -> Iterator[None]:
-    """One process at a time makes a recording: the second finds it finished. A lock of a process that dies is free."""
+    """Let one process at a time make a recording; the second finds it finished. The lock of a process that dies is free."""
     folder = plan.folder()
     folder.parent.mkdir(parents=True, exist_ok=True)
     with (folder.parent / f".{folder.name}.lock").open("w") as stream:
@@ -119,14 +121,15 @@ def _locked(plan: RecordingPlan) -> Iterator[None]:
 
 
 def _samples(row: Row, evidence: Path) -> dict[str, Samples]:
-    """Scored again from the trajectories that the evaluation left."""
-    path = evidence / f"{file_stem(row.method)}.tum"
+    """The errors behind a row's figures, scored again from the trajectories that the evaluation left."""
+    method = method_of(row.method)
+    path = evidence / f"{method.stem}.tum"
     if row.ape is None or not path.exists():
         return {}
     truth = read_tum(evidence / "ground-truth.tum")
-    scored = score_trajectory(read_tum(path), truth, metric=row.method in dict(MODES))
+    scored = score_trajectory(read_tum(path), truth, method.alignment)
     found = {name: _kept(score) for name, score in (("ape", scored.ape), ("rpe", scored.rpe), ("rpe_20m", scored.rpe_20m))}
-    path = evidence / f"{file_stem(row.method)}-localization.tum"
+    path = evidence / f"{method.stem}-localization.tum"
     if row.localization is not None and path.exists():
         located = _localization(read_tum(path), read_tum(evidence / "localization-ground-truth.tum"), row.localization.definition)
         found |= {"localization": located} if located is not None else {}

@@ -34,9 +34,10 @@ class Failure:
 
 @dataclass(frozen=True, slots=True)
 class Runner:
-    """Runs tasks and hears of each as it ends."""
+    """Runs tasks and says of each how it ended, as soon as it has."""
 
-    executors: Callable[[int | None], AbstractContextManager[Executor]]  # how many at once, None: as many as there are
+    # Makes an executor of so many processes at once; None: as many as there are.
+    executors: Callable[[int | None], AbstractContextManager[Executor]]
     progress: Progress
 
     def run(
@@ -46,7 +47,14 @@ class Runner:
         items: Sequence[TaskT],
         ended: Callable[[TaskT, ResultT | Failure], None],
     ) -> None:
-        """``task`` of each item. Items whose process died are tried again alone, so that the one to blame is known."""
+        """Run ``task`` on each item. Items whose process died are tried again alone, so that the one to blame is known.
+
+        Args:
+            stage: Name beside the progress bar.
+            task: What to do with an item, in another process.
+            items: What there is to do.
+            ended: Called with each item, in this process, and with its result or why there is none.
+        """
         bar = self.progress.add_task(stage, total=len(items))
 
         def tell(item: TaskT, result: ResultT | Failure) -> None:
@@ -70,7 +78,11 @@ class Runner:
         width: int | None,
         tell: Callable[[TaskT, ResultT | Failure], None],
     ) -> tuple[list[TaskT], list[TaskT]]:
-        """Items that ran when a process died and took the pool along, and those that had not begun; both empty if none died."""
+        """Run items in one executor of ``width`` processes.
+
+        The answer: the items that ran when a process died and took the executor along, and those that had not begun. Both are
+        empty if none died.
+        """
         with self.executors(width) as executor:
             futures = {executor.submit(partial(_guarded, task), item): item for item in items}
             try:
@@ -83,7 +95,7 @@ class Runner:
 def _watch(
     futures: dict[Future[ResultT | Failure], TaskT], tell: Callable[[TaskT, ResultT | Failure], None]
 ) -> tuple[list[TaskT], list[TaskT]]:
-    """Polls, so that an interrupt from the keyboard is heard."""
+    """Tell of each future as it ends; the answer is that of ``_pass``. Waits in turns, so that the keyboard is heard."""
     pending, begun = set(futures), set[Future[ResultT | Failure]]()
     lost: set[Future[ResultT | Failure]] = set()
     while pending:
@@ -130,7 +142,7 @@ def dask_cluster(address: str) -> Callable[[int | None], AbstractContextManager[
 
 
 def _guarded(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT | Failure:
-    """Errors come back as values: a bug in one cell must not lose a night of others."""
+    """Run a task and bring errors back as values: a bug in one cell must not lose a night of others."""
     try:
         return task(item)
     except HippodromeError as error:
@@ -140,4 +152,5 @@ def _guarded(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT | Failure
 
 
 def _said(error: BaseException) -> str:
+    """An error in one line."""
     return f"{type(error).__name__}: {' '.join(str(error).split())}"

@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -14,23 +13,14 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-import hippodrome.core.types
 from hippodrome.eval.files.scenarios import read_scenario
+from hippodrome.eval.reuse import figure_code_sha256
 from hippodrome.eval.sweep.executors import SweepError
 from hippodrome.sim.renamed import present_key
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS
 
-CODE = (
-    "core/**/*.py",
-    "sim/**/*.py",
-    "proto/**/*.py",
-    "eval/*.py",
-    "eval/methods/**/*.py",
-    "eval/metrics/**/*.py",
-    "eval/rivals/**/*.py",
-)
-MAX_CELLS = 100_000  # a slip of the keyboard, not a sweep
+MAX_CELLS = 100_000  # more is taken for a slip of the keyboard
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +32,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class SweepCell:
     """One point of the grid."""
 
     scenario: Scenario
@@ -59,13 +49,13 @@ class Cell:
 
     @property
     def key(self) -> str:
-        """Folder of the cell: of its scenario, effective configuration and code, so that nothing stale is taken for finished."""
-        text = json.dumps([self.scenario.model_dump_json(), code_sha256()])
+        """Name of the cell's folder, made of its whole configuration and of the code: nothing stale is taken for finished."""
+        text = json.dumps([self.scenario.model_dump_json(), cell_code_sha256()])
         return f"{self.scenario.name}-{self.scenario.seed}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
 
 
 def parse_parameter(text: str) -> Parameter:
-    """``KEY=V1,V2``; values as YAML. Raises ValueError."""
+    """The parameter of ``KEY=V1,V2``, values as YAML. Raises ValueError if the text is not of that form."""
     key, equals, values = text.partition("=")
     try:
         found = yaml.safe_load(f"[{values}]")
@@ -76,8 +66,17 @@ def parse_parameter(text: str) -> Parameter:
     return Parameter(key, tuple(found))
 
 
-def make_grid(paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Sequence[Parameter]) -> list[Cell]:
-    """All cells, in the order given. Raises HippodromeError on what is no scenario, and on cells that are twice there."""
+def make_grid(paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Sequence[Parameter]) -> list[SweepCell]:
+    """All cells of the grid, the last parameter's values changing fastest.
+
+    Args:
+        paths: The scenarios' files.
+        seeds: Seeds that replace the scenarios' own; None: their own.
+        parameters: Keys and the values that they take in turn.
+
+    Raises:
+        HippodromeError: A file is no scenario, a key or value cannot be set, a cell is there twice, or there are too many.
+    """
     count = len(paths) * len(seeds or [0])
     for parameter in parameters:
         count *= len(parameter.values)
@@ -85,7 +84,7 @@ def make_grid(paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Se
         raise SweepError(f"{count} cells, the limit is {MAX_CELLS}")
     chosen: Sequence[int | None] = seeds or (None,)
     cells = [cell for path in paths for seed in chosen for cell in _cells(read_scenario(path, None, seed), parameters)]
-    seen: dict[tuple[str, int, str], Cell] = {}
+    seen: dict[tuple[str, int, str], SweepCell] = {}
     for cell in cells:
         if seen.setdefault((cell.scenario.name, cell.scenario.seed, cell.label), cell) is not cell:
             raise SweepError(f"{cell.name}: twice in the grid; give each scenario a name of its own and each value once")
@@ -93,7 +92,7 @@ def make_grid(paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Se
 
 
 def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
-    """The scenario with one key replaced, checked as if it stood in the file."""
+    """The scenario with one key replaced, checked as if it stood in the file. Raises SweepError that names the key."""
     values = scenario.model_dump()
     *parents, last = present_key(key).split(".")
     place: Any = values
@@ -112,20 +111,16 @@ def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
         raise SweepError(f"--set {key}={value}: {reason}") from None
 
 
-@lru_cache(maxsize=1)
-def code_sha256() -> str:
-    """Of the code that figures come from."""
-    root, digest = Path(hippodrome.core.types.__file__).parent.parent, hashlib.sha256()
-    for path in sorted({path for pattern in CODE for path in root.glob(pattern)}):
-        digest.update(path.relative_to(root).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+def cell_code_sha256() -> str:
+    """Hash of the code that a cell's figures and samples come from."""
+    return figure_code_sha256("eval/sweep/cell.py")
 
 
-def _cells(scenario: Scenario, parameters: Sequence[Parameter]) -> Iterator[Cell]:
+def _cells(scenario: Scenario, parameters: Sequence[Parameter]) -> Iterator[SweepCell]:
+    """The cells of one scenario and seed: all combinations of values."""
     for values in product(*(parameter.values for parameter in parameters)):
         chosen: Mapping[str, Any] = dict(zip((parameter.key for parameter in parameters), values, strict=True))
         changed = scenario
         for key, value in chosen.items():
             changed = with_value(changed, key, value)
-        yield Cell(changed, tuple((key, json.dumps(value, sort_keys=True)) for key, value in chosen.items()))
+        yield SweepCell(changed, tuple((key, json.dumps(value, sort_keys=True)) for key, value in chosen.items()))

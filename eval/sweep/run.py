@@ -9,13 +9,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from hippodrome._files import write_atomically
 from hippodrome.eval.pool import progress_bar
 from hippodrome.eval.results.model import Results, to_json, write_results
+from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
 from hippodrome.eval.sweep.cell import ROLES, CellResult, CellTask, RecordingTask, make_recording, run_cell
 from hippodrome.eval.sweep.executors import Failure, Runner, SweepError, dask_cluster, local_processes
-from hippodrome.eval.sweep.grid import Cell, Parameter, code_sha256, make_grid
+from hippodrome.eval.sweep.grid import Parameter, SweepCell, cell_code_sha256, make_grid
 from hippodrome.eval.sweep.table import pooled_rows, sweep_markdown
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import RecordingPlan
 from hippodrome.sim.render.probe import require_gl
 
@@ -30,14 +31,26 @@ def sweep(
     scheduler: str | None,
     out: Path,
 ) -> bool:
-    """Run what is not finished, then merge; whether every cell has a result. Raises HippodromeError on bad input."""
+    """Run the cells that are not finished, then merge all; whether every cell has a result.
+
+    Args:
+        paths: The scenarios' files.
+        seeds: Seeds that replace the scenarios' own; None: their own.
+        parameters: Keys and the values that they take in turn.
+        workers: How many processes of this machine to use.
+        scheduler: Address of a Dask cluster's scheduler to run on instead; None: run here.
+        out: Folder for the merged results, the cells, and the recordings that they share.
+
+    Raises:
+        HippodromeError: Bad input, or nobody answers at the scheduler's address.
+    """
     out = out.resolve()  # a cluster's workers have a working directory of their own
     cells = make_grid(paths, seeds, parameters)
     if scheduler is None:
         require_gl()
     executors = dask_cluster(scheduler) if scheduler else local_processes(workers)
     finished = {cell: result for cell in cells if (result := _finished(cell, out)) is not None}
-    kept, failures = len(finished), dict[Cell, str]()
+    kept, failures = len(finished), dict[SweepCell, str]()
 
     def ended(task: CellTask, result: CellResult | Failure) -> None:
         if isinstance(result, Failure):
@@ -50,7 +63,7 @@ def sweep(
     with progress_bar() as progress:
         runner = Runner(executors, progress)
         runner.run("record", make_recording, _recordings(waiting, out), _let_pass)
-        tasks = [CellTask(cell, out, code_sha256()) for cell in waiting]
+        tasks = [CellTask(cell, out, cell_code_sha256()) for cell in waiting]
         runner.run("cells", run_cell, tasks, ended)
     _merge(cells, {cell: _read(_path(cell, out)) for cell in cells if cell in finished}, failures, out)
     print(f"{len(cells)} cell(s): {kept} kept, {len(finished) - kept} run, {len(failures)} failed\n"
@@ -60,28 +73,27 @@ def sweep(
     return not failures
 
 
-def _recordings(cells: Sequence[Cell], out: Path) -> list[RecordingTask]:
-    """Each drive once, however many cells it serves."""
+def _recordings(cells: Sequence[SweepCell], out: Path) -> list[RecordingTask]:
+    """One task for each drive, however many cells it serves."""
     plans = dict.fromkeys(RecordingPlan(_driven(cell), role, out) for cell in cells for role in ROLES)
-    return [RecordingTask(plan, code_sha256()) for plan in plans]
+    return [RecordingTask(plan, cell_code_sha256()) for plan in plans]
 
 
-def _driven(cell: Cell) -> Any:
-    """The scenario with whatever no drive depends on as it is by default: cells that differ in these share recordings."""
+def _driven(cell: SweepCell) -> Any:
+    """The scenario with defaults for all that no drive depends on: cells that differ only in these share their recordings."""
     fields = type(cell.scenario).model_fields
-    constants = ("mapper", "refine", "localizer", "thresholds", "description")
-    return cell.scenario.model_copy(update={name: fields[name].default for name in constants})
+    return cell.scenario.model_copy(update={name: fields[name].default for name in DRIVE_INDEPENDENT_KEYS})
 
 
 def _let_pass(_: RecordingTask, __: str | Failure) -> None:
     """A drive that cannot be made fails again, with its cause, in each cell that needs it."""
 
 
-def _path(cell: Cell, out: Path) -> Path:
+def _path(cell: SweepCell, out: Path) -> Path:
     return out / "cells" / cell.key / CELL
 
 
-def _finished(cell: Cell, out: Path) -> CellResult | None:
+def _finished(cell: SweepCell, out: Path) -> CellResult | None:
     return _read(_path(cell, out)) if _path(cell, out).exists() else None
 
 
@@ -94,7 +106,7 @@ def _read(path: Path) -> CellResult:
         ) from None
 
 
-def _merge(cells: Sequence[Cell], finished: dict[Cell, CellResult], failures: dict[Cell, str], out: Path) -> None:
+def _merge(cells: Sequence[SweepCell], finished: dict[SweepCell, CellResult], failures: dict[SweepCell, str], out: Path) -> None:
     """``results.json`` as of ``hippodrome eval``, each scenario named with its setting, and the pooled table beside it."""
     rows = pooled_rows(finished)
     scenarios = tuple(_named(cell, finished[cell]) for cell in cells if cell in finished)
@@ -104,6 +116,7 @@ def _merge(cells: Sequence[Cell], finished: dict[Cell, CellResult], failures: di
     write_atomically(out / TABLE, sweep_markdown(rows, failed).encode())
 
 
-def _named(cell: Cell, found: CellResult) -> Any:
+def _named(cell: SweepCell, found: CellResult) -> Any:
+    """The cell's result, named with its setting."""
     name = f"{found.result.name} ({cell.label})" if cell.parameters else found.result.name
     return found.result.model_copy(update={"name": name, "parameters": found.parameters})

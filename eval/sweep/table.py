@@ -8,18 +8,19 @@ from typing import Any
 import numpy as np
 
 from hippodrome.eval.metrics.trajectory import pool
+from hippodrome.eval.results.markdown import table
 from hippodrome.eval.results.model import Row, summarize
 from hippodrome.eval.sweep.cell import CellResult
-from hippodrome.eval.sweep.grid import Cell
+from hippodrome.eval.sweep.grid import SweepCell
 
-NONE = "-"
+NONE = "-"  # what stands for a figure that there is not
 HEAD = ("setting", "method", "runs", "failed", "APE mean (m)", "median", "p95", "max", "worst run", "RPE 20 m (m)",
         "localized", "localization mean (m)", "p95", "max", "false fixes")  # fmt: skip
 
 
-def pooled_rows(finished: Mapping[Cell, CellResult]) -> list[dict[str, Any]]:
-    """Settings in the order of the grid, methods in the order of the tables."""
-    settings: dict[str, list[tuple[Cell, CellResult]]] = {}
+def pooled_rows(finished: Mapping[SweepCell, CellResult]) -> list[dict[str, Any]]:
+    """One row of figures for each setting and method, as plain data: settings in the order of the grid, methods of the tables."""
+    settings: dict[str, list[tuple[SweepCell, CellResult]]] = {}
     for cell, result in finished.items():
         settings.setdefault(cell.label, []).append((cell, result))
     return [
@@ -29,7 +30,8 @@ def pooled_rows(finished: Mapping[Cell, CellResult]) -> list[dict[str, Any]]:
     ]
 
 
-def _pooled(label: str, method: str, cells: Sequence[tuple[Cell, CellResult]]) -> dict[str, Any]:
+def _pooled(label: str, method: str, cells: Sequence[tuple[SweepCell, CellResult]]) -> dict[str, Any]:
+    """One method's figures under one setting, over the samples of all cells of that setting."""
     rows = [(cell, row) for cell, one in cells for row in one.result.rows if row.method == method]
     samples = [one.samples[method] for _, one in cells if method in one.samples]
     pooled = {
@@ -49,7 +51,8 @@ def _pooled(label: str, method: str, cells: Sequence[tuple[Cell, CellResult]]) -
     }
 
 
-def _worst(rows: Sequence[tuple[Cell, Row]]) -> dict[str, Any] | None:
+def _worst(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, Any] | None:
+    """The cell with the greatest mean APE; None if none was scored."""
     scored = [(row.ape.mean_m, cell) for cell, row in rows if row.ape is not None]
     if not scored:
         return None
@@ -57,7 +60,8 @@ def _worst(rows: Sequence[tuple[Cell, Row]]) -> dict[str, Any] | None:
     return {"cell": cell.name, "scenario": cell.scenario.name, "seed": cell.scenario.seed, "ape_mean_m": mean_m}
 
 
-def _localized(rows: Sequence[tuple[Cell, Row]]) -> dict[str, int] | None:
+def _localized(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, int] | None:
+    """In how many cells the method localized the second drive; None if it does not localize."""
     found = [row.localization for _, row in rows if row.localization is not None]
     if not found:
         return None
@@ -67,8 +71,7 @@ def _localized(rows: Sequence[tuple[Cell, Row]]) -> dict[str, int] | None:
 
 def sweep_markdown(rows: Sequence[Mapping[str, Any]], failures: Sequence[tuple[str, str]]) -> str:
     """The table, and the cells that have no result."""
-    lines = ["# Sweep", "", f"| {' | '.join(HEAD)} |", "|---|---|" + "---:|" * (len(HEAD) - 2)]
-    lines += [f"| {' | '.join(_line(row))} |" for row in rows]
+    lines = ["# Sweep", "", *table(HEAD, map(_line, rows), align="ll" + "r" * (len(HEAD) - 2))]
     lines += ["", "Means, percentiles and maxima are over the samples of all runs together; the worst run is the one with the "
               "greatest mean.", ""]  # fmt: skip
     if failures:
@@ -78,6 +81,7 @@ def sweep_markdown(rows: Sequence[Mapping[str, Any]], failures: Sequence[tuple[s
 
 
 def _line(row: Mapping[str, Any]) -> list[str]:
+    """The cells below ``HEAD``."""
     ape, worst, localized = row.get("ape"), row["worst"], row["localized"]
     located = row.get("localization")
     return [

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from hippodrome.core.mapping.mapper import MapperConfig
+from hippodrome.core.mapping.mapper import Mapper, MapperConfig
 from hippodrome.core.types import EdgeKind
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED
@@ -91,8 +91,8 @@ def test_closures_come_from_the_frames(run):
             noise = None if observation.frame is None else rng.integers(0, 256, observation.frame.shape, dtype=np.uint8)
             yield type(observation)(observation.t_s, observation.dt_s, observation.speed, observation.yaw_rate_radps, noise)
 
-    seeing, _ = map_recording(recording.observations(), MapperConfig())
-    blind, _ = map_recording(blinded(), MapperConfig())
+    seeing, _ = map_recording(recording.observations(), Mapper(MapperConfig()))
+    blind, _ = map_recording(blinded(), Mapper(MapperConfig()))
     assert np.count_nonzero(seeing.edges.kind == EdgeKind.CLOSURE) >= 10
     assert np.count_nonzero(blind.edges.kind == EdgeKind.CLOSURE) == 0
 

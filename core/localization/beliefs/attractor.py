@@ -1,17 +1,18 @@
-"""Pose belief of the localizer: head-direction ring, grid-cell tori and a scale cell, coupled through path integration.
+"""Mode "coupled": head-direction ring, grid-cell tori and a scale, coupled through path integration.
 
 Each network follows Eqs. (3)-(7) and (13)-(16), Li et al. 2025, on its own. What the equations lack is that path integration
-ties them together: a heading error becomes a position error across the track, a scale error one along it. The couplings are
-those covariances, of each population its own while the two are in conflict. With them an injection of a pose reaches every
-network as an injection of its own, Eqs. (13)-(14): one whose mean and reliability leave the belief of Eqs. (15)-(16) where the
-whole evidence puts it.
+makes their errors depend on each other: a heading error becomes a position error across the track, a scale error one along it.
+These cross-covariances are kept beside the networks, for each population of cells its own while the two are in conflict.
+
+With them a measured pose reaches every network as an injection of its own, Eqs. (13)-(14), whose mean and reliability are chosen
+such that the read-out of Eqs. (15)-(16) is the joint (Kalman) update of all four quantities.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -19,186 +20,204 @@ from hippodrome.core.attractors import grid_cells, head_direction
 from hippodrome.core.attractors.attractor import CALIBRATION, INTEGRATOR
 from hippodrome.core.attractors.grid_cells import GridState
 from hippodrome.core.attractors.head_direction import HeadDirectionState
+from hippodrome.core.localization.beliefs.belief import NetworkActivity, network_activity
+from hippodrome.core.localization.beliefs.config import BeliefConfig
 from hippodrome.core.localization.beliefs.motion import (
     Motion,
-    correction,
+    PoseMeasurement,
     displacement_m,
     innovation,
+    kalman_update,
     predicted_covariance,
 )
-from hippodrome.core.localization.config import Injection, LocalizerConfig
 from hippodrome.core.types import FloatArray
 
-BROADEST_RAD = 1.0  # a heading less certain than this carries no direction that a coupling could learn
-LEAST_LEFT = 0.5  # share of a variance that one motion may take away (driving back undoes what driving on did)
+BROADEST_RAD = 1.0  # largest standard deviation of the heading: with a larger one no cross-covariance could be learned
+LEAST_LEFT = 0.5  # share of a variance that one motion must leave: driving back undoes what driving on has added
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ties:
-    """What one population knows beyond the rings: its sheet, its scale, and how its errors hang together."""
+class JointEstimate:
+    """What one population of cells knows beyond its ring and tori: its place among their repetitions, the scale, covariances."""
 
-    position_m: FloatArray  # (2,) tells the sheet of the tori
+    position_m: FloatArray  # (2,) the position, from which its phases on the tori are unwrapped
     log_scale: float  # ln(metres per map unit of this drive)
-    coupling: FloatArray  # (4, 4) covariances of x, y, heading and log scale; of the diagonal only the scale's variance is used
+    cross_covariance: FloatArray  # (4, 4) of x, y, heading, log scale; on the diagonal only the variance of the scale is used
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AttractorPose:
-    """State of the networks. While a challenger is up, the calibration cells hold it and the integrators the incumbent."""
+class AttractorBelief:
+    """State of the networks. While there is a challenger, the calibration cells hold it and the integrators the incumbent."""
 
     head: HeadDirectionState
     grid: GridState
-    ties: tuple[Ties, Ties]  # of the integrators and of the calibration cells; without a challenger the same
+    joint: tuple[JointEstimate, JointEstimate]  # of integrators and calibration cells; the same while there is no challenger
     challenged: bool
-    config: LocalizerConfig
-    _incumbent: tuple[FloatArray, FloatArray] = field(init=False, repr=False)  # pose (3,), covariance (4, 4): asked for often
+    config: BeliefConfig
+    _incumbent: tuple[FloatArray, FloatArray] = field(init=False, repr=False)  # pose (3,), covariance (4, 4): often asked for
+    keeps_challenger: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_incumbent", self._belief(INTEGRATOR))
+        object.__setattr__(self, "_incumbent", self._estimate(INTEGRATOR))
 
     @classmethod
-    def uniform(cls, start_m: FloatArray, log_scale: float, config: LocalizerConfig) -> Self:
-        """No prior knowledge but the map's scale; ``start_m`` (2,) only serves as a place to count sheets from."""
-        ties = Ties(start_m, log_scale, np.diag([0.0, 0.0, 0.0, config.motion.scale_prior**2]))
+    def uniform(cls, start_m: FloatArray, log_scale: float, config: BeliefConfig) -> Self:
+        """No prior knowledge but the map's scale; ``start_m`` (2,) is only a point from which phases are unwrapped."""
+        joint = JointEstimate(start_m, log_scale, np.diag([0.0, 0.0, 0.0, config.motion.scale_prior**2]))
         return cls(
             head=head_direction.uniform(config.head),
             grid=grid_cells.uniform(grid_cells.module_periods(config.smallest_period_m), config.grid),
-            ties=(ties, ties),
+            joint=(joint, joint),
             challenged=False,
             config=config,
         )
 
     @property
     def pose(self) -> FloatArray:
-        """(3,) the read-out of Eqs. (15)-(16), of the incumbent alone while it is challenged."""
+        """The read-out (3,) of Eqs. (15)-(16), of the incumbent alone while it is challenged."""
         return self._incumbent[0].copy()
 
     @property
     def covariance(self) -> FloatArray:
-        """(3, 3) of ``pose``."""
+        """Covariance (3, 3) of ``pose``."""
         return self._incumbent[1][:3, :3].copy()
 
     @property
     def log_scale(self) -> float:
-        """ln(metres per map unit of this drive), the incumbent's."""
-        return self.ties[INTEGRATOR].log_scale
+        """ln(metres per map unit of this drive), as the incumbent has it."""
+        return self.joint[INTEGRATOR].log_scale
+
+    def activity(self) -> NetworkActivity:
+        """The two networks as they are."""
+        return network_activity(self.head, self.grid)
 
     def predict(self, motion: Motion) -> Self:
-        """Path integration, then inhibition; reliabilities fade by the motion's noise and by what the couplings pass on."""
-        inte = self._moved(INTEGRATOR, motion)
-        cali = self._moved(CALIBRATION, motion) if self.challenged else inte
-        added = np.stack([inte.added, cali.added])
-        turned = motion.turned_rad / motion.dt_s, motion.dt_s
-        head = head_direction.integrate(self.head, *turned, (float(added[INTEGRATOR, 2]), float(added[CALIBRATION, 2])))
-        grid = grid_cells.integrate(self.grid, np.stack([inte.step_m, cali.step_m]), added[:, :2])
+        """Path integration, then inhibition. Reliabilities fade by the motion's noise and by the errors that couple into them."""
+        integrator = self._path_integrated(INTEGRATOR, motion)
+        calibration = self._path_integrated(CALIBRATION, motion) if self.challenged else integrator
+        added = np.stack([integrator.added_variance, calibration.added_variance])
+        head = head_direction.integrate(
+            self.head,
+            motion.turned_rad / motion.dt_s,
+            motion.dt_s,
+            (float(added[INTEGRATOR, 2]), float(added[CALIBRATION, 2])),
+        )
+        grid = grid_cells.integrate(self.grid, np.stack([integrator.step_m, calibration.step_m]), added[:, :2])
         return replace(
             self,
             head=head_direction.inhibit(head, motion.dt_s, self.config.head),
             grid=grid_cells.inhibit(grid, motion.dt_s, self.config.grid),
-            ties=(inte.ties, cali.ties),
+            joint=(integrator.joint, calibration.joint),
         )
 
-    def _moved(self, population: int, motion: Motion) -> _Moved:
-        pose, covariance = self._incumbent if population == INTEGRATOR else self._belief(population)
-        ties = self.ties[population]
+    def _path_integrated(self, population: int, motion: Motion) -> _PathIntegration:
+        """The motion along the population's own heading, at its own scale, and the variance that it adds."""
+        pose, covariance = self._incumbent if population == INTEGRATOR else self._estimate(population)
+        joint = self.joint[population]
         heading_rad = float(pose[2])
-        grown = predicted_covariance(covariance, heading_rad, ties.log_scale, motion, self.config.motion)
+        predicted = predicted_covariance(covariance, heading_rad, joint.log_scale, motion, self.config.motion)
         variance = np.diag(covariance)[:3]
         least = np.zeros(3) if self.challenged else (LEAST_LEFT - 1.0) * variance
-        added = np.maximum(np.diag(grown)[:3] - variance, least)
-        step_m = np.array(displacement_m(heading_rad, ties.log_scale, motion))
-        return _Moved(step_m, added, Ties(ties.position_m + step_m, ties.log_scale, grown))
+        added_variance = np.maximum(np.diag(predicted)[:3] - variance, least)
+        step_m = np.array(displacement_m(heading_rad, joint.log_scale, motion))
+        return _PathIntegration(step_m, added_variance, JointEstimate(joint.position_m + step_m, joint.log_scale, predicted))
 
-    def sq_distance(self, injection: Injection, challenger: bool = False) -> float:
-        """Squared Mahalanobis distance of the injection from the incumbent or the challenger."""
-        pose, covariance = self._belief(CALIBRATION) if challenger else self._incumbent
-        difference = innovation(pose, injection)
-        covariance = covariance[:3, :3] + injection.covariance
-        return float(difference @ np.linalg.solve(covariance, difference))
+    def sq_distance(self, measurement: PoseMeasurement, challenger: bool = False) -> float:
+        """Squared Mahalanobis distance of a measured pose from the incumbent, or from the challenger."""
+        pose, covariance = self._estimate(CALIBRATION) if challenger else self._incumbent
+        difference = innovation(pose, measurement)
+        return float(difference @ np.linalg.solve(covariance[:3, :3] + measurement.covariance, difference))
 
-    def inject(self, injection: Injection) -> Self:
-        """An injection that agrees with the incumbent: Eqs. (13)-(16) and hand-back in each network."""
-        settled = self._settle(INTEGRATOR) if self.challenged else self
-        share = settled._share(INTEGRATOR, injection)
-        head = head_direction.inject(settled.head, float(share.pose[2]), float(share.reliability[2]), self.config.head)
-        grid = grid_cells.inject(settled.grid, share.pose[:2], share.reliability[:2], self.config.grid)
-        position_m, _ = grid_cells.read_out(grid, share.ties.position_m)
-        ties = replace(share.ties, position_m=position_m)
-        return replace(settled, head=head, grid=grid, ties=(ties, ties))
+    def inject(self, measurement: PoseMeasurement) -> Self:
+        """A measured pose that agrees with the incumbent: Eqs. (13)-(16) and hand-back in each network."""
+        settled = self._settled_on(INTEGRATOR) if self.challenged else self
+        given = settled._injections(INTEGRATOR, measurement)
+        head = head_direction.inject(settled.head, float(given.pose[2]), float(given.reliability[2]), self.config.head)
+        grid = grid_cells.inject(settled.grid, given.pose[:2], given.reliability[:2], self.config.grid)
+        position_m, _ = grid_cells.read_out(grid, given.joint.position_m)
+        joint = replace(given.joint, position_m=position_m)
+        return replace(settled, head=head, grid=grid, joint=(joint, joint))
 
-    def reinforce(self, injection: Injection) -> Self:
-        """An injection that agrees with the challenger: Eqs. (13)-(14), no hand-back."""
-        share = self._share(CALIBRATION, injection)
-        head = head_direction.stimulate(self.head, float(share.pose[2]), float(share.reliability[2]))
-        grid = grid_cells.stimulate(self.grid, share.pose[:2], share.reliability[:2])
-        position_m, _ = grid_cells.population_belief(grid, CALIBRATION, share.ties.position_m)
-        return replace(self, head=head, grid=grid, ties=(self.ties[INTEGRATOR], replace(share.ties, position_m=position_m)))
+    def reinforce(self, measurement: PoseMeasurement) -> Self:
+        """A measured pose that agrees with the challenger: Eqs. (13)-(14), no hand-back."""
+        given = self._injections(CALIBRATION, measurement)
+        head = head_direction.stimulate(self.head, float(given.pose[2]), float(given.reliability[2]))
+        grid = grid_cells.stimulate(self.grid, given.pose[:2], given.reliability[:2])
+        position_m, _ = grid_cells.population_belief(grid, CALIBRATION, given.joint.position_m)
+        joint = replace(given.joint, position_m=position_m)
+        return replace(self, head=head, grid=grid, joint=(self.joint[INTEGRATOR], joint))
 
-    def _share(self, population: int, injection: Injection) -> _Share:
-        """What the networks have to be given so that Eqs. (13)-(16) leave them at the joint belief of all four quantities."""
-        (pose, covariance), ties = self._belief(population), self.ties[population]
-        shift, after = correction(covariance, innovation(pose, injection), injection)
-        before = np.diag(covariance)[:3]
-        left = np.diag(after)[:3] / before
-        quarter = 0.25 * self.grid.period[0]  # farther away, a virtual position would change sheets
-        offset = np.clip(shift[:3] / (1.0 - left), [-quarter, -quarter, -0.5 * math.pi], [quarter, quarter, 0.5 * math.pi])
-        reached = Ties(pose[:2] + shift[:2], ties.log_scale + float(shift[3]), after)
-        return _Share(pose + offset, (1.0 / left - 1.0) / before, reached)
+    def _injections(self, population: int, measurement: PoseMeasurement) -> _Injections:
+        """What each network must be given so that Eqs. (13)-(16) bring it to the joint update of all four quantities.
 
-    def challenge(self, injection: Injection) -> Self:
-        """A conflicting injection: the calibration cells leave for it, the integrators stay."""
-        xy_m, heading_rad = injection.pose[:2], float(injection.pose[2])
-        sq, incumbent = np.diag(injection.covariance), self.ties[INTEGRATOR]
-        coupling = np.zeros((4, 4))
-        coupling[:3, :3], coupling[3, 3] = injection.covariance, incumbent.coupling[3, 3]
+        If the joint update leaves the share ``left`` of a variance and shifts the mean by ``shift``, then so does an injection at
+        ``shift / (1 - left)`` from the mean, whose reliability is that of the belief times ``1 / left - 1``.
+        """
+        (pose, covariance), joint = self._estimate(population), self.joint[population]
+        shift, updated = kalman_update(covariance, innovation(pose, measurement), measurement)
+        variance = np.diag(covariance)[:3]
+        left = np.diag(updated)[:3] / variance
+        quarter_m = 0.25 * self.grid.period[0]  # farther away an injection could unwrap to a neighbouring repetition of a torus
+        reach = [quarter_m, quarter_m, 0.5 * math.pi]
+        offset = np.clip(shift[:3] / (1.0 - left), np.negative(reach), reach)
+        reached = JointEstimate(pose[:2] + shift[:2], joint.log_scale + float(shift[3]), updated)
+        return _Injections(pose + offset, (1.0 / left - 1.0) / variance, reached)
+
+    def challenge(self, measurement: PoseMeasurement) -> Self:
+        """A measured pose that conflicts: the calibration cells leave for it, with the incumbent's scale."""
+        position_m, heading_rad = measurement.pose[:2], float(measurement.pose[2])
+        variance, incumbent = np.diag(measurement.covariance), self.joint[INTEGRATOR]
+        covariance = np.zeros((4, 4))
+        covariance[:3, :3], covariance[3, 3] = measurement.covariance, incumbent.cross_covariance[3, 3]
         return replace(
             self,
-            head=head_direction.challenge(self.head, heading_rad, 1.0 / sq[2]),
-            grid=grid_cells.challenge(self.grid, xy_m, 1.0 / sq[:2]),
-            ties=(incumbent, Ties(xy_m, incumbent.log_scale, coupling)),
+            head=head_direction.challenge(self.head, heading_rad, 1.0 / variance[2]),
+            grid=grid_cells.challenge(self.grid, position_m, 1.0 / variance[:2]),
+            joint=(incumbent, JointEstimate(position_m, incumbent.log_scale, covariance)),
             challenged=True,
         )
 
     def adopt(self) -> Self:
-        """The challenger has won: a snap, and what was learned about the incumbent's errors is void."""
-        return self._settle(CALIBRATION)
+        """The challenger has won: the integrators snap to it, and what was learned about the incumbent's errors is dropped."""
+        return self._settled_on(CALIBRATION)
 
-    def _settle(self, population: int) -> Self:
+    def _settled_on(self, population: int) -> Self:
+        """The conflict is over: both populations hold what this one believes."""
         return replace(
             self,
             head=head_direction.adopt(self.head, population, self.config.head),
             grid=grid_cells.adopt(self.grid, population, self.config.grid),
-            ties=(self.ties[population], self.ties[population]),
+            joint=(self.joint[population], self.joint[population]),
             challenged=False,
         )
 
-    def _belief(self, population: int) -> tuple[FloatArray, FloatArray]:
-        """Pose (3,) and covariance (4, 4) of one side while they are in conflict, else of both fused."""
-        ties = self.ties[population]
+    def _estimate(self, population: int) -> tuple[FloatArray, FloatArray]:
+        """Pose (3,) and covariance (4, 4): of one population while the two are in conflict, else of both fused."""
+        joint = self.joint[population]
         if self.challenged:
             heading_rad, r_heading = float(self.head.mean_rad[population]), float(self.head.reliability[population])
-            xy_m, r_position = grid_cells.population_belief(self.grid, population, ties.position_m)
+            position_m, r_position = grid_cells.population_belief(self.grid, population, joint.position_m)
         else:
             heading_rad, r_heading = head_direction.read_out(self.head)
-            xy_m, r_position = grid_cells.read_out(self.grid, ties.position_m)
-        covariance = ties.coupling.copy()
+            position_m, r_position = grid_cells.read_out(self.grid, joint.position_m)
+        covariance = joint.cross_covariance.copy()
         covariance[[0, 1, 2], [0, 1, 2]] = [1.0 / r_position[0], 1.0 / r_position[1], min(1.0 / r_heading, BROADEST_RAD**2)]
-        return np.array([*xy_m, heading_rad]), covariance
+        return np.array([*position_m, heading_rad]), covariance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Moved:
-    """What self-motion does to one population."""
+class _PathIntegration:
+    """What a motion does to one population."""
 
-    step_m: FloatArray  # (2,)
-    added: FloatArray  # (3,) to the variances: m^2, m^2, rad^2
-    ties: Ties
+    step_m: FloatArray  # (2,) displacement
+    added_variance: FloatArray  # (3,) of x, y, heading: m^2, m^2, rad^2
+    joint: JointEstimate  # afterwards
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Share:
-    """An injection as the networks get it, each on its own, and the ties that go with it."""
+class _Injections:
+    """A measured pose as each network gets it."""
 
-    pose: FloatArray  # (3,)
+    pose: FloatArray  # (3,) means for the tori and the ring
     reliability: FloatArray  # (3,) 1/m^2, 1/m^2, 1/rad^2
-    ties: Ties
+    joint: JointEstimate  # afterwards

@@ -1,20 +1,22 @@
-"""The yardstick: an extended Kalman filter over (x, y, heading, ln scale), given the same motions and injections."""
+"""Mode "kalman", a yardstick: an extended Kalman filter over (x, y, heading, log scale) with a challenger."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
+from hippodrome.core.localization.beliefs.belief import NetworkActivity, no_networks
+from hippodrome.core.localization.beliefs.config import BeliefConfig
 from hippodrome.core.localization.beliefs.motion import (
     Motion,
-    correction,
+    PoseMeasurement,
     displacement_m,
     innovation,
+    kalman_update,
     predicted_covariance,
 )
-from hippodrome.core.localization.config import Injection, LocalizerConfig
 from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
@@ -30,15 +32,16 @@ class Gaussian:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class KalmanPose:
-    """An incumbent and, while injections conflict with it, a challenger."""
+class KalmanBelief:
+    """An incumbent and, while measured poses conflict with it, a challenger."""
 
     incumbent: Gaussian
     challenger: Gaussian | None
-    config: LocalizerConfig
+    config: BeliefConfig
+    keeps_challenger: ClassVar[bool] = True
 
     @classmethod
-    def uniform(cls, start_m: FloatArray, log_scale: float, config: LocalizerConfig) -> Self:
+    def uniform(cls, start_m: FloatArray, log_scale: float, config: BeliefConfig) -> Self:
         """No prior knowledge but the map's scale; ``start_m`` (2,) is the mean of a flat belief."""
         covariance = np.zeros((4, 4))
         covariance[:3, :3], covariance[3, 3] = UNKNOWN, config.motion.scale_prior**2
@@ -46,12 +49,12 @@ class KalmanPose:
 
     @property
     def pose(self) -> FloatArray:
-        """(3,)."""
+        """Mean pose (3,) of the incumbent."""
         return self.incumbent.mean[:3]
 
     @property
     def covariance(self) -> FloatArray:
-        """(3, 3) of ``pose``."""
+        """Covariance (3, 3) of ``pose``."""
         return self.incumbent.covariance[:3, :3].copy()
 
     @property
@@ -61,47 +64,54 @@ class KalmanPose:
 
     @property
     def challenged(self) -> bool:
+        """Whether there is a challenger."""
         return self.challenger is not None
 
+    def activity(self) -> NetworkActivity:
+        """The heading alone: a filter has no networks."""
+        return no_networks(self.incumbent.mean[2], self.incumbent.covariance[2, 2])
+
     def predict(self, motion: Motion) -> Self:
-        """Both beliefs moved."""
-        challenger = None if self.challenger is None else _predict(self.challenger, motion, self.config)
-        return replace(self, incumbent=_predict(self.incumbent, motion, self.config), challenger=challenger)
+        """Both hypotheses moved."""
+        challenger = None if self.challenger is None else _predicted(self.challenger, motion, self.config)
+        return replace(self, incumbent=_predicted(self.incumbent, motion, self.config), challenger=challenger)
 
-    def sq_distance(self, injection: Injection, challenger: bool = False) -> float:
-        """Squared Mahalanobis distance of the injection from the incumbent or the challenger."""
+    def sq_distance(self, measurement: PoseMeasurement, challenger: bool = False) -> float:
+        """Squared Mahalanobis distance of a measured pose from the incumbent, or from the challenger."""
         belief = self.challenger if challenger and self.challenger is not None else self.incumbent
-        difference = innovation(belief.mean[:3], injection)
-        return float(difference @ np.linalg.solve(belief.covariance[:3, :3] + injection.covariance, difference))
+        difference = innovation(belief.mean[:3], measurement)
+        return float(difference @ np.linalg.solve(belief.covariance[:3, :3] + measurement.covariance, difference))
 
-    def inject(self, injection: Injection) -> Self:
-        """Measurement update; the challenger is dismissed."""
-        return replace(self, incumbent=_update(self.incumbent, injection), challenger=None)
+    def inject(self, measurement: PoseMeasurement) -> Self:
+        """Measurement update of the incumbent; the challenger is dismissed."""
+        return replace(self, incumbent=_updated(self.incumbent, measurement), challenger=None)
 
-    def challenge(self, injection: Injection) -> Self:
-        """A conflicting injection: a second hypothesis with the incumbent's scale."""
+    def challenge(self, measurement: PoseMeasurement) -> Self:
+        """A measured pose that conflicts becomes the challenger, with the incumbent's scale."""
         covariance = np.zeros((4, 4))
-        covariance[:3, :3], covariance[3, 3] = injection.covariance, self.incumbent.covariance[3, 3]
-        return replace(self, challenger=Gaussian(np.append(injection.pose, self.incumbent.mean[3]), covariance))
+        covariance[:3, :3], covariance[3, 3] = measurement.covariance, self.incumbent.covariance[3, 3]
+        return replace(self, challenger=Gaussian(np.append(measurement.pose, self.incumbent.mean[3]), covariance))
 
-    def reinforce(self, injection: Injection) -> Self:
+    def reinforce(self, measurement: PoseMeasurement) -> Self:
         """Measurement update of the challenger."""
-        return replace(self, challenger=None if self.challenger is None else _update(self.challenger, injection))
+        return replace(self, challenger=None if self.challenger is None else _updated(self.challenger, measurement))
 
     def adopt(self) -> Self:
-        """The challenger has won."""
+        """The challenger becomes the incumbent."""
         return replace(self, incumbent=self.challenger or self.incumbent, challenger=None)
 
 
-def _predict(belief: Gaussian, motion: Motion, config: LocalizerConfig) -> Gaussian:
+def _predicted(belief: Gaussian, motion: Motion, config: BeliefConfig) -> Gaussian:
+    """The belief after a motion along its own heading, at its own scale."""
     x_m, y_m, heading_rad, log_scale = belief.mean.tolist()
     east_m, north_m = displacement_m(heading_rad, log_scale, motion)
     mean = np.array([x_m + east_m, y_m + north_m, wrap_compiled(heading_rad + motion.turned_rad), log_scale])
     return Gaussian(mean, predicted_covariance(belief.covariance, heading_rad, log_scale, motion, config.motion))
 
 
-def _update(belief: Gaussian, injection: Injection) -> Gaussian:
-    shift, covariance = correction(belief.covariance, innovation(belief.mean[:3], injection), injection)
+def _updated(belief: Gaussian, measurement: PoseMeasurement) -> Gaussian:
+    """The belief after a measured pose."""
+    shift, covariance = kalman_update(belief.covariance, innovation(belief.mean[:3], measurement), measurement)
     mean = belief.mean + shift
     mean[2] = wrap_compiled(mean[2])
     return Gaussian(mean, covariance)

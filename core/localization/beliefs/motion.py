@@ -1,6 +1,7 @@
-"""Motion model of both pose beliefs, linearised: how an error in heading or scale becomes one of position.
+"""Motion and measurement of the state (x_m, y_m, heading_rad, log_scale), linearised. Covariances of the state are (4, 4).
 
-The state is (x_m, y_m, heading_rad, log_scale); its covariance is (4, 4).
+The networks and the Kalman filter share these equations. An error in the heading becomes an error of the position across the
+track, and an error in the scale becomes one along it: both show in the cross-covariances.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from hippodrome.core.localization.config import Injection, MotionNoise
+from hippodrome.core.localization.beliefs.config import MotionNoise
 from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
@@ -20,70 +21,101 @@ from hippodrome.core.types import FloatArray
 class Motion:
     """Self-motion over one observation."""
 
-    travelled: float  # map units of this drive
+    travelled: float  # path length, in map units of this drive
     turned_rad: float
     dt_s: float
-    gyro_rad_per_sqrt_s: float = 0.0  # what the signal itself shows of its noise
+    gyro_rad_per_sqrt_s: float = 0.0  # random walk of the heading that the signal itself shows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseMeasurement:
+    """A pose in the network frame that a recognised view tells: ``pose`` (3,), ``covariance`` (3, 3) in m, m, rad."""
+
+    pose: FloatArray
+    covariance: FloatArray
 
 
 def predicted_covariance(
     covariance: FloatArray, heading_rad: float, log_scale: float, motion: Motion, noise: MotionNoise
 ) -> FloatArray:
-    """Covariance (4, 4) after ``motion`` from a state of that heading and scale."""
-    along = displacement_m(heading_rad, log_scale, motion)
+    """Covariance (4, 4) of the state after a motion.
+
+    Args:
+        covariance: that of the state before (4, 4).
+        heading_rad: heading of the state before.
+        log_scale: ln(metres per map unit) of the state before.
+        motion: the motion.
+        noise: its noise.
+    """
+    east_m, north_m = displacement_m(heading_rad, log_scale, motion)
     walk = max(noise.gyro_rad_per_sqrt_s, motion.gyro_rad_per_sqrt_s)
     sq_heading = walk**2 * motion.dt_s + (noise.gyro_gain * motion.turned_rad) ** 2
-    sq_scale = noise.scale_walk_per_sqrt_m**2 * math.hypot(*along)
-    grown: FloatArray = _grown(covariance, along[0], along[1], noise.speed**2 / motion.dt_s, sq_heading, sq_scale)
-    return grown
+    sq_scale = noise.scale_walk_per_sqrt_m**2 * math.hypot(east_m, north_m)
+    predicted: FloatArray = _predicted(covariance, east_m, north_m, noise.speed**2 / motion.dt_s, sq_heading, sq_scale)
+    return predicted
 
 
 @njit(cache=True)
-def _grown(
+def _predicted(
     covariance: FloatArray, east_m: float, north_m: float, sq_speed: float, sq_heading: float, sq_scale: float
 ) -> FloatArray:
-    """J P J^T + Q, where J adds heading and scale errors, turned about or drawn along the step, to x and y."""
-    moved = covariance.copy()
+    """J P J^T + Q. J adds to x and y the heading error times the step turned left, and the scale error times the step.
+
+    Q holds the variance of the speed along the step, and those that the motion adds to heading and scale.
+    """
+    left = covariance.copy()  # J P
     for k in range(4):
-        moved[0, k] += east_m * covariance[3, k] - north_m * covariance[2, k]
-        moved[1, k] += north_m * covariance[3, k] + east_m * covariance[2, k]
-    grown = moved.copy()
+        left[0, k] += east_m * covariance[3, k] - north_m * covariance[2, k]
+        left[1, k] += north_m * covariance[3, k] + east_m * covariance[2, k]
+    both = left.copy()  # (J P) J^T
     for k in range(4):
-        grown[k, 0] += east_m * moved[k, 3] - north_m * moved[k, 2]
-        grown[k, 1] += north_m * moved[k, 3] + east_m * moved[k, 2]
-    grown[0, 0] += sq_speed * east_m * east_m
-    grown[0, 1] += sq_speed * east_m * north_m
-    grown[1, 0] += sq_speed * east_m * north_m
-    grown[1, 1] += sq_speed * north_m * north_m
-    grown[2, 2] += sq_heading
-    grown[3, 3] += sq_scale
-    return grown
+        both[k, 0] += east_m * left[k, 3] - north_m * left[k, 2]
+        both[k, 1] += north_m * left[k, 3] + east_m * left[k, 2]
+    both[0, 0] += sq_speed * east_m * east_m
+    both[0, 1] += sq_speed * east_m * north_m
+    both[1, 0] += sq_speed * east_m * north_m
+    both[1, 1] += sq_speed * north_m * north_m
+    both[2, 2] += sq_heading
+    both[3, 3] += sq_scale
+    return both
 
 
 def displacement_m(heading_rad: float, log_scale: float, motion: Motion) -> tuple[float, float]:
-    """x += cos(theta) v dt, y += sin(theta) v dt, along the chord of the turn."""
+    """Step to the east and to the north: x += cos(theta) v dt, y += sin(theta) v dt, theta that of the chord of the turn."""
     distance_m, chord_rad = motion.travelled * math.exp(log_scale), heading_rad + 0.5 * motion.turned_rad
     return distance_m * math.cos(chord_rad), distance_m * math.sin(chord_rad)
 
 
-def innovation(pose: FloatArray, injection: Injection) -> FloatArray:
-    """Injected pose (3,) minus ``pose``, the heading along the shorter arc."""
-    difference: FloatArray = injection.pose - pose
+def innovation(pose: FloatArray, measurement: PoseMeasurement) -> FloatArray:
+    """Measured pose (3,) minus the believed ``pose`` (3,), the heading along the shorter arc."""
+    difference: FloatArray = measurement.pose - pose
     difference[2] = wrap_compiled(difference[2])
     return difference
 
 
-def correction(covariance: FloatArray, difference: FloatArray, injection: Injection) -> tuple[FloatArray, FloatArray]:
-    """Shift (4,) and covariance (4, 4) of the state after an injection that differs from it by ``difference`` (3,)."""
-    shift, after = _corrected(covariance, difference, injection.covariance)
-    return shift, after
+def kalman_update(covariance: FloatArray, difference: FloatArray, measurement: PoseMeasurement) -> tuple[FloatArray, FloatArray]:
+    """Kalman update by a measured pose.
+
+    Args:
+        covariance: that of the state before (4, 4).
+        difference: the innovation (3,).
+        measurement: the measured pose; only its covariance is read.
+
+    Returns:
+        The shift (4,) of the state, and its covariance (4, 4) after the update.
+    """
+    shift, updated = _kalman_update(covariance, difference, measurement.covariance)
+    return shift, updated
 
 
 @njit(cache=True)
-def _corrected(covariance: FloatArray, difference: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Gain P H^T S^-1, then Joseph's form, which stays symmetric; H sees the first three of the state."""
-    seen = np.ascontiguousarray(covariance[:, :3])
-    gain = np.ascontiguousarray(np.linalg.solve(seen[:3] + noise, seen.T).T)
-    left = np.eye(4)
-    left[:, :3] -= gain
-    return gain @ difference, left @ covariance @ left.T + gain @ noise @ gain.T
+def _kalman_update(covariance: FloatArray, difference: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Gain K = P H^T S^-1, then Joseph's form (I - K H) P (I - K H)^T + K R K^T, which stays symmetric.
+
+    H picks the first three numbers of the state.
+    """
+    cross = np.ascontiguousarray(covariance[:, :3])  # P H^T
+    gain = np.ascontiguousarray(np.linalg.solve(cross[:3] + noise, cross.T).T)
+    rest = np.eye(4)
+    rest[:, :3] -= gain
+    return gain @ difference, rest @ covariance @ rest.T + gain @ noise @ gain.T

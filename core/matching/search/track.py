@@ -16,7 +16,7 @@ _BRISK_PERCENTILE = 90.0  # brisk speed of a drive among its speeds while moving
 _BRISK_SHARES = (0.25, 1.3)  # brisk speed over the network's speed limits: an anxious driver in a jam, a reckless one
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Track:
     """A drive sampled at T even arc lengths, ``step`` map units apart.
 

@@ -18,12 +18,12 @@ OPTICAL_IN_BODY = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """One frame as it lies on disk."""
+    """One frame as it lies on disk: the bytes of its PNG file."""
 
     t_s: float
-    number: int
-    left: bytes  # PNG
-    right: bytes | None
+    number: int  # number of the frame, from 0
+    left: bytes
+    right: bytes | None  # None: the camera is no stereo pair
 
 
 def camera_of(recording: Recording) -> CameraSpec | None:
@@ -33,13 +33,13 @@ def camera_of(recording: Recording) -> CameraSpec | None:
 
 
 def intrinsics(camera: CameraSpec) -> FloatArray:
-    """(3, 3) pinhole matrix, pixel centres at whole numbers."""
+    """The pinhole matrix (3, 3) in pixels; pixel centres lie at whole numbers."""
     focal_px = camera.focal_px()
     return np.array([[focal_px, 0.0, camera.width / 2 - 0.5], [0.0, focal_px, camera.height / 2 - 0.5], [0.0, 0.0, 1.0]])
 
 
 def camera_in_body(camera: CameraSpec | None) -> FloatArray:
-    """(4, 4) pose of the left camera, optical axes, in the vehicle's; without calibration it sits at the rear axle."""
+    """Pose (4, 4) of the left camera, optical axes, in the vehicle's frame; without a calibration it is at the rear axle."""
     pose = np.eye(4)
     pose[:3, :3] = OPTICAL_IN_BODY
     if camera is not None:
@@ -51,7 +51,7 @@ def camera_in_body(camera: CameraSpec | None) -> FloatArray:
 
 
 def right_in_left(camera: CameraSpec) -> FloatArray:
-    """(4, 4) pose of a stereo pair's right camera in the left one's axes."""
+    """Pose (4, 4) of a stereo pair's right camera in the left one's axes."""
     pose = np.eye(4)
     pose[0, 3] = camera.stereo_baseline_m or 0.0
     return pose

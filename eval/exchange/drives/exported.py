@@ -9,30 +9,28 @@ from typing import Literal
 
 import numpy as np
 
+from hippodrome._files import sha256_of
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import CognitiveMap, HippodromeError, Trajectory
+from hippodrome.core.types import CognitiveMap, Trajectory
+from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.files.trajectories import read_tum
+from hippodrome.eval.methods.method import method_of
 from hippodrome.eval.methods.stages import dead_reckoning
 from hippodrome.proto.codec import load_map
-from hippodrome.sim.files import sha256_of
 from hippodrome.sim.network import read_network
 from hippodrome.sim.recording import MANIFEST, Recording, open_recording
 
-TRUTH = {"mapping": "ground-truth", "localization": "localization-ground-truth"}
-LOCALIZED = "-localization"  # ends the names of estimates that belong to the localization drive
+TRUTH = {"mapping": "ground-truth", "localization": "localization-ground-truth"}  # stem of the truth's file, by drive
+LOCALIZED = "-localization"  # end of the stems of estimates that belong to the localization drive
 DEAD_RECKONING = "dead-reckoning"
-
-
-class ExchangeError(HippodromeError):
-    """A folder that cannot be exported, or a foreign drive that cannot be imported."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """A method's trajectory. ``frame`` "network": metres in the road network's frame; "own": map units from its own start."""
+    """A method's trajectory."""
 
     trajectory: Trajectory
-    frame: Literal["network", "own"]
+    frame: Literal["network", "own"]  # network: metres in the road network's frame; own: map units from its own start
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,14 +39,22 @@ class ExportedDrive:
 
     name: str
     recording: Recording
-    truth: Trajectory | None
-    estimates: dict[str, Estimate]
-    maps: dict[str, CognitiveMap]
-    network: RoadNetwork | None
+    truth: Trajectory | None  # None: the drive was imported without truth
+    estimates: dict[str, Estimate]  # by method
+    maps: dict[str, CognitiveMap]  # by the stem of the map's file
+    network: RoadNetwork | None  # None: its file was not found
 
 
 def gather_drives(folder: Path, network: Path | None) -> list[ExportedDrive]:
-    """The drives of a recording, of a scenario's folder or of a whole run. Raises HippodromeError."""
+    """The drives of a recording, of a scenario's results or of a whole run.
+
+    Args:
+        folder: The folder of one of these.
+        network: The road network's file; None: it is looked for beside the results.
+
+    Raises:
+        HippodromeError: The folder is none of these, or something in it cannot be read.
+    """
     if (folder / MANIFEST).exists():
         recording = open_recording(folder)
         return [_drive(folder.name, recording, {}, {}, network or _network_file(recording, folder.parent.parent))]
@@ -61,14 +67,14 @@ def gather_drives(folder: Path, network: Path | None) -> list[ExportedDrive]:
 
 
 def truth_of(recording: Recording) -> Trajectory | None:
-    """The reference where it is known: an imported drive may have it for a part, or not at all."""
+    """The true poses where they are known; None if nowhere. An imported drive may have them for a part."""
     truth = recording.ground_truth()
     known = np.isfinite(truth.poses).all(axis=1)
     return Trajectory(truth.t_s[known], truth.poses[known]) if known.any() else None
 
 
 def _scenario_drives(folder: Path, network: Path | None) -> Iterator[ExportedDrive]:
-    """The mapping and the localization drive of one scenario; drives whose recording is gone cannot be exported."""
+    """The mapping and the localization drive of one scenario. Raises ExchangeError if the recording of one of them is gone."""
     root = folder.parent
     estimates = {path.stem: read_tum(path) for path in sorted(folder.glob("*.tum"))}
     maps = {path.stem: load_map(path)[0] for path in sorted(folder.glob("*.pbstream"))}
@@ -93,7 +99,7 @@ def _drive(
 
 def _frame_of(method: str) -> Literal["network", "own"]:
     """Refinement and localization answer in the network's frame, everything else in a frame of its own."""
-    return "network" if method.startswith("topometric") else "own"
+    return "network" if method_of(method).frame == "network" else "own"
 
 
 def _role_of(stem: str) -> str:

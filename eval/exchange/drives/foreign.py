@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
-import cv2
 import numpy as np
-from PIL import Image, UnidentifiedImageError
 
 from hippodrome.core import se2
-from hippodrome.core.types import FloatArray, Frame, Trajectory
-from hippodrome.eval.exchange.drives.exported import ExchangeError
+from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.poses import Axes, planar, rotations
 from hippodrome.eval.metrics.association import MAX_GAP_S
 
-MAX_IMAGE_BYTES = 64 << 20
-MAX_PIXELS = 64_000_000  # a hostile image can claim any size in a few bytes
-MAX_TABLE_BYTES = 512 << 20
-MIN_NORM, MAX_NORM = 0.5, 1.5  # of a quaternion: writers round
+MIN_NORM, MAX_NORM = 0.5, 1.5  # limits of a unit quaternion's norm: writers round
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForeignFrame:
-    """A frame where it lies."""
+    """A frame that is not read yet."""
 
     t_s: float
-    name: str  # for errors
-    load: Callable[[], bytes]  # an encoded image
+    name: str  # how errors name it
+    load: Callable[[], bytes]  # reads the encoded image
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,68 +36,49 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForeignDrive:
-    """Frames in order of time, and what else was found."""
+    """What a reader found in a foreign drive; None where the layout has nothing of the kind."""
 
-    frames: Sequence[ForeignFrame]
+    frames: Sequence[ForeignFrame]  # in order of time
     motion: Motion | None
     truth: Trajectory | None
-    focal_px: float | None
-
-
-def read_table(path: Path, columns: int, separator: str | None = None, exactly: bool = False) -> FloatArray:
-    """Numbers (N, columns or more) of a text file; lines that begin with # are comments. Raises ExchangeError with the line."""
-    rows = []
-    for number, line in enumerate(read_lines(path), start=1):
-        if not line.strip() or line.startswith("#"):
-            continue
-        words = line.strip().split(separator)
-        if len(words) < columns or (exactly and len(words) != columns):
-            raise ExchangeError(f"{path}: line {number}: {len(words)} columns, expected {columns}")
-        try:
-            rows.append([float(word) for word in words[:columns]])
-        except ValueError:
-            raise ExchangeError(f"{path}: line {number}: not a number in '{line.strip()[:60]}'") from None
-    if not rows:
-        raise ExchangeError(f"{path}: no data")
-    table = np.array(rows)
-    if not np.isfinite(table).all():
-        raise ExchangeError(f"{path}: data row {int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0]) + 1} is not finite")
-    return table
-
-
-def read_lines(path: Path) -> list[str]:
-    """Lines of a text file of bounded size."""
-    try:
-        if (size := path.stat().st_size) > MAX_TABLE_BYTES:
-            raise ExchangeError(f"{path}: {size} bytes, the limit is {MAX_TABLE_BYTES}")
-        return path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ExchangeError(f"{path}: cannot be read as text: {error}") from None
+    focal_px: float | None  # focal length, in pixels of the frames as recorded
 
 
 def trajectory_of(t_s: FloatArray, positions: FloatArray, quaternions_xyzw: FloatArray, axes: Axes, name: str) -> Trajectory:
-    """Planar poses of 3-D ones, checked."""
+    """Planar poses of poses in space.
+
+    Args:
+        t_s: Times (N,).
+        positions: Positions (N, 3), metres or map units.
+        quaternions_xyzw: Attitudes (N, 4), each of a norm near 1.
+        axes: What the attitude turns: the vehicle's axes (x forward) or a camera's (z forward).
+        name: How errors name the poses.
+
+    Raises:
+        ExchangeError: A quaternion is far from a unit one, or the times do not increase.
+    """
     norm = np.linalg.norm(quaternions_xyzw, axis=1)
     if not ((norm > MIN_NORM) & (norm < MAX_NORM)).all():
         bad = int(np.flatnonzero(~((norm > MIN_NORM) & (norm < MAX_NORM)))[0])
         raise ExchangeError(f"{name}: pose {bad} has no unit quaternion")
-    return increasing(Trajectory(t_s, planar(positions, rotations(quaternions_xyzw), axes)), name)
+    return with_increasing_times(Trajectory(t_s, planar(positions, rotations(quaternions_xyzw), axes)), name)
 
 
-def increasing(trajectory: Trajectory, name: str) -> Trajectory:
+def with_increasing_times(trajectory: Trajectory, name: str) -> Trajectory:
     """The trajectory itself. Raises ExchangeError if its times do not increase."""
     require_increasing(trajectory.t_s, name)
     return trajectory
 
 
 def require_increasing(t_s: FloatArray, name: str) -> None:
+    """Raise ExchangeError, naming the first row at fault, unless the times (N,) increase from row to row."""
     if (np.diff(t_s) <= 0.0).any():
         bad = int(np.flatnonzero(np.diff(t_s) <= 0.0)[0]) + 1
         raise ExchangeError(f"{name}: time {t_s[bad]:.6f} of row {bad} does not increase; sort the rows, drop duplicates")
 
 
 def motion_table(t_s: FloatArray, speed: FloatArray, yaw_rate: FloatArray, name: str) -> Motion:
-    """Self-motion, checked."""
+    """Self-motion of times (N,), speeds (N,) and yaw rates (N,). Raises ExchangeError on times that do not increase."""
     if len(t_s) < 2:
         raise ExchangeError(f"{name}: {len(t_s)} row(s) of self-motion, at least 2 are needed")
     require_increasing(t_s, name)
@@ -113,7 +86,10 @@ def motion_table(t_s: FloatArray, speed: FloatArray, yaw_rate: FloatArray, name:
 
 
 def motion_of(trajectory: Trajectory, name: str) -> Motion:
-    """Poses differentiated: between two of them the vehicle drives an arc, backwards if it lies behind."""
+    """Self-motion by differentiating poses: between two of them the vehicle drives an arc of a circle.
+
+    It drives backwards if the second pose lies behind the first. Raises ExchangeError if there are fewer than three poses.
+    """
     if len(trajectory.t_s) < 3:
         raise ExchangeError(f"{name}: {len(trajectory.t_s)} pose(s), at least 3 are needed to tell self-motion")
     dt_s = np.diff(trajectory.t_s)
@@ -125,7 +101,7 @@ def motion_of(trajectory: Trajectory, name: str) -> Motion:
 
 
 def truth_at(truth: Trajectory, t_s: FloatArray) -> FloatArray:
-    """Poses (N, 3), nan where the truth has a gap or has not begun."""
+    """True poses (N, 3) at times (N,), interpolated; NaN where the truth has a gap, has not begun, or has ended."""
     poses = se2.interpolate(truth.t_s, truth.poses, t_s)
     after = np.clip(np.searchsorted(truth.t_s, t_s), 1, max(len(truth.t_s) - 1, 1))
     gap_s = truth.t_s[np.minimum(after, len(truth.t_s) - 1)] - truth.t_s[after - 1]
@@ -134,42 +110,3 @@ def truth_at(truth: Trajectory, t_s: FloatArray) -> FloatArray:
     inside = (t_s >= truth.t_s[0]) & (t_s <= truth.t_s[-1]) & (gap_s <= MAX_GAP_S)
     poses[~(inside | near)] = np.nan
     return poses
-
-
-def decode(frame: ForeignFrame) -> Frame:
-    """RGB (H, W, 3), 8 bits: grey is repeated, alpha dropped, 16 bits scaled. Raises ExchangeError."""
-    blob = frame.load()
-    if len(blob) > MAX_IMAGE_BYTES:
-        raise ExchangeError(f"{frame.name}: {len(blob)} bytes, the limit is {MAX_IMAGE_BYTES}")
-    try:
-        with Image.open(io.BytesIO(blob)) as header:  # reads no pixel
-            width, height = header.size
-    except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise ExchangeError(f"{frame.name}: not an image ({' '.join(str(error).split())[:80]})") from None
-    if width * height > MAX_PIXELS or min(width, height) < 16:
-        raise ExchangeError(f"{frame.name}: {width} x {height} pixels; at least 16 a side, at most {MAX_PIXELS} in all")
-    image: Any = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
-    if image is None or image.shape[:2] != (height, width):
-        raise ExchangeError(f"{frame.name}: a damaged image")
-    return np.ascontiguousarray(image[:, :, ::-1])
-
-
-def file_frame(t_s: float, path: Path) -> ForeignFrame:
-    """A frame in a file of its own."""
-
-    def load() -> bytes:
-        try:
-            if (size := path.stat().st_size) > MAX_IMAGE_BYTES:
-                raise ExchangeError(f"{path}: {size} bytes, the limit is {MAX_IMAGE_BYTES}")
-            return path.read_bytes()
-        except OSError as error:
-            raise ExchangeError(f"{path}: cannot be read: {error.strerror}") from None
-
-    return ForeignFrame(t_s, str(path), load)
-
-
-def inside(folder: Path, name: str, listed_in: Path) -> Path:
-    """A file that a list names; a list cannot lead out of its folder."""
-    if Path(name).is_absolute() or ".." in Path(name).parts:
-        raise ExchangeError(f"{listed_in}: '{name}' lies outside of the folder")
-    return folder / name

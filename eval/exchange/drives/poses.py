@@ -10,19 +10,19 @@ from scipy.spatial.transform import Rotation
 
 from hippodrome.core.types import FloatArray
 
-Axes: TypeAlias = Literal["body", "camera"]
+Axes: TypeAlias = Literal["body", "camera"]  # body: x forward, y left, z up; camera: x right, y down, z forward
 Nanoseconds: TypeAlias = NDArray[np.int64]
 
 
 def quaternions(poses: FloatArray) -> FloatArray:
-    """(N, 4) x, y, z, w of poses (N, 3)."""
+    """Quaternions (N, 4), x y z w, of planar poses (N, 3)."""
     half = poses[:, 2] / 2.0
     zeros = np.zeros(len(poses))
     return np.column_stack([zeros, zeros, np.sin(half), np.cos(half)])
 
 
 def matrices(poses: FloatArray) -> FloatArray:
-    """(N, 4, 4) of poses (N, 3), z = 0."""
+    """Homogeneous matrices (N, 4, 4) of planar poses (N, 3), at z = 0."""
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     found = np.tile(np.eye(4), (len(poses), 1, 1))
     found[:, 0, 0], found[:, 0, 1], found[:, 1, 0], found[:, 1, 1] = cos, -sin, sin, cos
@@ -36,16 +36,19 @@ def nanoseconds(t_s: FloatArray) -> Nanoseconds:
 
 
 def rotations(quaternions_xyzw: FloatArray) -> FloatArray:
-    """(N, 3, 3) of quaternions (N, 4) of any norm but zero."""
+    """Rotation matrices (N, 3, 3) of quaternions (N, 4), x y z w, of any norm but zero."""
     found: FloatArray = Rotation.from_quat(quaternions_xyzw).as_matrix()
     return found
 
 
 def planar(positions: FloatArray, rotation: FloatArray, axes: Axes, world: Axes = "body") -> FloatArray:
-    """Poses (N, 3) on the ground of positions (N, 3) and rotations (N, 3, 3); height, roll and pitch are dropped.
+    """Poses (N, 3) on the ground; height, roll and pitch are dropped.
 
-    ``axes`` is what the moving frame points along: "body", x forward; "camera", z forward. ``world`` "body" has z up, "camera"
-    is KITTI's, x right and z forward, y down.
+    Args:
+        positions: Positions (N, 3).
+        rotation: Attitudes (N, 3, 3), from the moving frame to the world's.
+        axes: Axes of the moving frame.
+        world: Axes of the world: "body" has z up; "camera" is KITTI's, with y down.
     """
     forward = rotation[:, :, 0 if axes == "body" else 2]
     east, north = (positions[:, 0], positions[:, 1]) if world == "body" else (positions[:, 2], -positions[:, 0])

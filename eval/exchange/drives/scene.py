@@ -11,31 +11,34 @@ from hippodrome.core import se2
 from hippodrome.core.types import CognitiveMap, EdgeKind, FloatArray
 from hippodrome.eval.exchange.drives.exported import ExportedDrive
 
-GROWTH_S = 5.0  # between two states of a growing map: some 40 m of road, and few enough to keep a file small
+GROWTH_S = 5.0  # time between two states of a growing map: some 40 m of road, and few enough states to keep a file small
 NETWORK_FRAME, VEHICLE_FRAME, CAMERA_FRAME = "network", "vehicle", "camera"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapState:
-    """A map as far as it was made by ``t_s``; vertices lie where the finished map has them."""
+    """A map as far as it was made at one time; vertices lie where the finished map has them."""
 
     t_s: float
-    path: FloatArray  # (V, 2)
-    closures: FloatArray  # (C, 2, 2) both ends of each loop closure
+    path: FloatArray  # (V, 2) positions of the vertices
+    closures: FloatArray  # (C, 2, 2) positions of both ends of each loop closure
 
 
 def frame_id(drive: ExportedDrive, method: str) -> str:
-    """The frame in which a method's trajectory is given."""
+    """Name of the frame in which a method's trajectory is given."""
     return NETWORK_FRAME if drive.estimates[method].frame == "network" else f"own/{method}"
 
 
 def map_frame_id(name: str, cognitive_map: CognitiveMap) -> str:
-    """The frame in which a map's vertices are given."""
+    """Name of the frame in which a map's vertices are given."""
     return NETWORK_FRAME if cognitive_map.frame == "network" else f"own/{name}"
 
 
 def own_frames(drive: ExportedDrive) -> dict[str, FloatArray]:
-    """Pose (3,) in the network's frame of each frame of a method's own: its first pose laid on the truth, nothing scaled."""
+    """Where each method's own frame lies in the network's, as a pose (3,) by the frame's name.
+
+    The method's first pose is laid on the truth at that time; nothing is scaled.
+    """
     starts = {
         f"own/{method}": (estimate.trajectory.t_s[0], estimate.trajectory.poses[0])
         for method, estimate in drive.estimates.items()
@@ -48,7 +51,7 @@ def own_frames(drive: ExportedDrive) -> dict[str, FloatArray]:
 
 
 def growth(cognitive_map: CognitiveMap) -> Iterator[MapState]:
-    """The map every ``GROWTH_S``, and finished at its last vertex."""
+    """The states of a growing map, one every ``GROWTH_S``, and the finished map at the time of its last vertex."""
     t_s, edges = cognitive_map.t_s, cognitive_map.edges
     closing = edges.kind == EdgeKind.CLOSURE
     ends = np.stack([edges.source[closing], edges.target[closing]], axis=1)
@@ -59,7 +62,7 @@ def growth(cognitive_map: CognitiveMap) -> Iterator[MapState]:
 
 
 def lanes(drive: ExportedDrive) -> list[FloatArray]:
-    """Centrelines (n, 2) of the road network."""
+    """The centreline (n, 2) of each lane of the road network; none if it is not known."""
     network = drive.network
     return [] if network is None else [network.lane_points_m(lane) for lane in range(network.lane_count)]
 

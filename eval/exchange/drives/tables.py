@@ -16,7 +16,7 @@ ODOMETRY_HEAD = "#t_s,speed [map units/s],yaw_rate [rad/s], means since the line
 
 
 def write_rows(path: Path, rows: Iterable[Sequence[Any]], head: str | None = None, separator: str = " ") -> None:
-    """A line a row; a float is printed with the digits that it takes to read it back as it was."""
+    """Write a text table, a line a row, below the line ``head``. Floats are printed so that they read back exactly."""
     path.parent.mkdir(parents=True, exist_ok=True)
     lines = [head] if head else []
     lines += [separator.join(_printed(value) for value in row) for row in rows]
@@ -24,14 +24,14 @@ def write_rows(path: Path, rows: Iterable[Sequence[Any]], head: str | None = Non
 
 
 def write_odometry(path: Path, recording: Recording) -> None:
-    """Self-motion as sensed: all that a mapper may have beside the frames."""
+    """Write the self-motion as it was sensed, which is all that a mapper may have beside the frames."""
     samples = recording.samples
     rows = zip(samples.t_s, samples.speed, samples.yaw_rate_radps, strict=True)
     write_rows(path, rows, ODOMETRY_HEAD, ",")
 
 
 def flat(matrix: FloatArray) -> list[float]:
-    """A matrix row by row."""
+    """The numbers of a matrix, row by row."""
     return [float(value) for value in matrix.ravel()]
 
 

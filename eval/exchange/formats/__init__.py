@@ -1,1 +1,5 @@
-"""One module a format; each has ``CONVENTIONS`` (frames, units, precision) and ``write``, which fills an empty folder."""
+"""Formats to export to, one module each.
+
+Each has ``CONVENTIONS``, which says frames, units and precision, and ``write(drives, folder)``, which fills an empty folder.
+Begin with ``tum``, the shortest; ``export.FORMATS`` lists them all.
+"""

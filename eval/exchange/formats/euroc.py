@@ -39,7 +39,7 @@ ODOMETRY_HEAD = "#timestamp [ns],speed [map units s^-1],yaw_rate [rad s^-1]"
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
-    """A sequence a drive."""
+    """Write one sequence for each drive."""
     for drive in drives:
         _write_sequence(drive, folder / drive.name / "mav0")
 
@@ -100,7 +100,7 @@ def _write_odometry(recording: Recording, here: Path) -> None:
 
 
 def _write_states(path: Path, trajectory: Trajectory) -> None:
-    """EuRoC's 17 columns: pose, velocity by differences, and the biases of an IMU that is not there."""
+    """Write EuRoC's 17 columns: pose, velocity by differences, and zeros for the biases of an IMU that there is not."""
     quaternion = np.roll(quaternions(trajectory.poses), 1, axis=1)
     count, nothing = len(trajectory.t_s), np.zeros(7)
     velocity = np.zeros((count, 2)) if count < 2 else np.gradient(trajectory.poses[:, :2], trajectory.t_s, axis=0)

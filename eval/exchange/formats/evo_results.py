@@ -12,7 +12,8 @@ from evo.core.trajectory import PoseTrajectory3D
 from evo.tools import file_interface
 
 from hippodrome.core.types import FloatArray
-from hippodrome.eval.exchange.drives.exported import Estimate, ExchangeError, ExportedDrive
+from hippodrome.eval.exchange.drives.errors import ExchangeError
+from hippodrome.eval.exchange.drives.exported import Estimate, ExportedDrive
 from hippodrome.eval.exchange.drives.poses import quaternions
 from hippodrome.eval.methods.materials import RPE_DELTA_M
 from hippodrome.eval.metrics.association import associate
@@ -25,7 +26,7 @@ CONVENTIONS = (
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
-    """Two archives for each drive and method."""
+    """Write two archives for each drive and method. Raises ExchangeError if no drive has a truth."""
     if not any(drive.truth is not None for drive in drives):
         raise ExchangeError("no drive has a truth: evo has nothing to compare with")
     for drive in drives:

@@ -36,7 +36,7 @@ CONVENTIONS = (
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
-    """Sequence 00, 01, ... in the order of the drives."""
+    """Write sequences 00, 01, ... in the order of the drives."""
     for number, drive in enumerate(drives):
         _write_sequence(drive, folder, f"{number:02d}")
 
@@ -74,7 +74,10 @@ def _in_camera(trajectory: Trajectory, origin: FloatArray | None, in_body: Float
 
 
 def _from_own_start(trajectory: Trajectory) -> FloatArray:
-    """Turned to camera axes but not moved there: nobody knows how many map units the camera sits ahead of the axle."""
+    """Poses (N, 4, 4) relative to the first, turned to the camera's axes.
+
+    They are not moved to the camera: nobody knows how many map units it sits ahead of the axle.
+    """
     turned = camera_in_body(None)
     poses = matrices(trajectory.poses) @ turned
     found: FloatArray = np.linalg.inv(poses[0]) @ poses
@@ -86,7 +89,7 @@ def _write_poses(path: Path, poses: FloatArray) -> None:
 
 
 def _write_calibration(path: Path, camera: CameraSpec) -> None:
-    """P0..P3: projections of rectified points, the right camera shifted by the baseline."""
+    """Write P0 to P3, the projections of rectified points; the right camera is shifted by the baseline."""
     left = np.hstack([intrinsics(camera), np.zeros((3, 1))])
     right = left.copy()
     right[0, 3] = -intrinsics(camera)[0, 0] * right_in_left(camera)[0, 3]

@@ -62,7 +62,7 @@ MAP: Final = Color(r=0.1, g=0.45, b=0.85, a=1.0)
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
-    """A file a drive."""
+    """Write one file for each drive."""
     for drive in drives:
         with (folder / f"{drive.name}.mcap").open("wb") as stream, Writer(stream) as writer:
             for stamp, _, topic, message in heapq.merge(*_streams(drive), key=lambda event: event[:2]):
@@ -70,7 +70,7 @@ def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
 
 
 def _streams(drive: ExportedDrive) -> list[Iterable[Event]]:
-    """Each in order of time; the second item of an event keeps the order of streams at one instant."""
+    """All streams of messages of a drive, each in order of time; at one instant they keep this order."""
     streams = [_static(drive), _images(drive), _self_motion(drive)]
     if drive.truth is not None:
         streams += [_poses(TRUTH, NETWORK_FRAME, drive.truth), _vehicle(drive.truth)]
@@ -85,7 +85,7 @@ def _ranked(order: int, stream: Iterable[tuple[int, str, Any]]) -> Iterator[Even
 
 
 def _static(drive: ExportedDrive) -> Iterator[tuple[int, str, Any]]:
-    """What holds from the start on: where the camera sits, where the methods' own frames lie, the roads."""
+    """Messages of what holds from the start on: where the camera sits, where the methods' own frames lie, the roads."""
     stamp = 0
     camera = camera_of(drive.recording)
     in_body = camera_in_body(camera)
@@ -116,7 +116,7 @@ def _images(drive: ExportedDrive) -> Iterator[tuple[int, str, Any]]:
 
 
 def _self_motion(drive: ExportedDrive) -> Iterator[tuple[int, str, Any]]:
-    """Speed and yaw rate as sensed; the pose is these integrated."""
+    """Messages of speed and yaw rate as sensed; their pose is these integrated."""
     samples = drive.recording.samples
     reckoned, _ = dead_reckoning(drive.recording.self_motion())
     for t_s, pose, speed, yaw_rate in zip(samples.t_s, reckoned.poses, samples.speed, samples.yaw_rate_radps, strict=True):
@@ -149,7 +149,7 @@ def _map(drive: ExportedDrive, name: str) -> Iterator[tuple[int, str, Any]]:
 
 
 def _scene(stamp: int, frame: str, name: str, lines: list[LinePrimitive]) -> SceneUpdate:
-    """An entity replaces the one of the same id."""
+    """Lines to draw, under a name; they replace what was drawn under it before."""
     return SceneUpdate(entities=[SceneEntity(timestamp=_time(stamp), frame_id=frame, id=name, lines=lines)])
 
 

@@ -40,7 +40,7 @@ ROAD, MAP, CLOSURE = (150, 150, 165), (25, 115, 217), (242, 140, 38)
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
-    """A file a drive."""
+    """Write one file for each drive."""
     for drive in drives:
         stream = rr.RecordingStream(APPLICATION, recording_id=drive.name, send_properties=False)
         stream.save(folder / f"{drive.name}.rrd")
@@ -57,7 +57,7 @@ def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
 
 
 def entity_of(frame: str, name: str) -> str:
-    """Where something given in ``frame`` hangs in the tree."""
+    """Path in Rerun's tree of something that is given in ``frame``."""
     return f"{ROOT}/{name}" if frame == ROOT else f"{ROOT}/{frame}/{name}"
 
 
@@ -75,7 +75,7 @@ def _log_static(stream: rr.RecordingStream, drive: ExportedDrive) -> None:
 
 
 def _log_frames(stream: rr.RecordingStream, drive: ExportedDrive) -> None:
-    """One by one, so that a long drive need not fit into memory."""
+    """Log the frames one by one, so that a long drive need not fit into memory."""
     for picture in pictures(drive.recording):
         stream.set_time(TIMELINE, duration=picture.t_s)
         stream.log(CAMERA, rr.EncodedImage(contents=picture.left, media_type="image/png"))
@@ -90,7 +90,7 @@ def _log_self_motion(stream: rr.RecordingStream, drive: ExportedDrive) -> None:
 
 
 def _log_poses(stream: rr.RecordingStream, frame: str, name: str, trajectory: Trajectory) -> None:
-    """The moving pose, and the whole path beside it: below it the path would move along."""
+    """Log the moving pose, and the whole path beside it in the tree: below it, the path would move along."""
     places = _raised(trajectory.poses[:, :2])
     columns = rr.Transform3D.columns(translation=places, quaternion=quaternions(trajectory.poses))
     stream.send_columns(entity_of(frame, name), indexes=[_times(trajectory.t_s)], columns=columns)

@@ -30,11 +30,11 @@ CONVENTIONS = (
 )
 IMAGE, ODOMETRY, TRUTH = "/camera/image/compressed", "/odometry", "/ground_truth"
 ROS = get_typestore(Stores.ROS2_HUMBLE)
-FORMAT_VERSION: Final = 8  # of the bag's metadata, what ROS 2 Humble and later read
+FORMAT_VERSION: Final = 8  # version of the bag's metadata that ROS 2 Humble and later read
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
-    """A bag a drive."""
+    """Write one bag for each drive."""
     for drive in drives:
         streams = [_images(drive), _odometry(drive)]
         if drive.truth is not None:
@@ -75,7 +75,7 @@ def _poses(topic: str, frame: str, trajectory: Trajectory) -> Iterator[tuple[int
 
 
 def _ros_name(method: str) -> str:
-    """ROS names have no hyphens and no dots."""
+    """A method's name without the hyphens and dots that ROS names must not have."""
     return "".join(letter if letter.isalnum() else "_" for letter in method)
 
 

@@ -18,7 +18,7 @@ CONVENTIONS = (
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
-    """A sequence a drive."""
+    """Write one sequence for each drive."""
     for drive in drives:
         here = folder / drive.name
         (here / "rgb").mkdir(parents=True)

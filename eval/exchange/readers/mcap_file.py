@@ -14,7 +14,7 @@ from mcap.reader import McapReader, make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.exchange.drives.exported import ExchangeError
+from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import (
     ForeignDrive,
     ForeignFrame,
@@ -23,16 +23,18 @@ from hippodrome.eval.exchange.drives.foreign import (
     trajectory_of,
 )
 from hippodrome.eval.exchange.drives.poses import Axes
-from hippodrome.eval.exchange.readers.raw_image import png_of
+from hippodrome.eval.exchange.readers.messages import TRUTH_TOPICS, png_of
 from hippodrome.eval.exchange.readers.spool import Spool
 
 IMAGES = ("foxglove.CompressedImage", "foxglove.RawImage")
 ODOMETRY, POSE = "foxglove.Odometry", "foxglove.PoseInFrame"
-TRUTH_TOPICS = ("/ground_truth", "/groundtruth", "/gt_pose")
 
 
 def read_mcap(path: Path, axes: Axes) -> ForeignDrive:
-    """The first topic of images, the first of odometry, and the truth by its customary names."""
+    """Read an MCAP file: the first topic of images, the first of odometry, and the truth by its customary names.
+
+    Raises ExchangeError if the file cannot be read or has no images.
+    """
     try:
         with path.open("rb") as stream:
             topics = _topics(make_reader(stream), path)
@@ -53,6 +55,7 @@ def read_mcap(path: Path, axes: Axes) -> ForeignDrive:
 
 
 def _topics(reader: McapReader, path: Path) -> dict[str, str]:
+    """The schema of each topic, by the topic's name, in the order of the file's channels."""
     summary = reader.get_summary()
     if summary is None:
         raise ExchangeError(f"{path}: no summary in it, so it was cut short; repair it with `mcap recover`")
@@ -64,6 +67,7 @@ def _topics(reader: McapReader, path: Path) -> dict[str, str]:
 
 
 def _messages(stream: Any, topic: str) -> Iterator[tuple[int, Any]]:
+    """Time in nanoseconds and message of one topic: the message's own time stamp or, without one, the log's."""
     stream.seek(0)
     reader = make_reader(stream, decoder_factories=[DecoderFactory()])
     for decoded in reader.iter_decoded_messages(topics=[topic]):

@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from hippodrome.core.types import Trajectory
-from hippodrome.eval.exchange.drives.exported import ExchangeError
+from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import (
     ForeignDrive,
     ForeignFrame,
@@ -21,16 +21,18 @@ from hippodrome.eval.exchange.drives.foreign import (
     trajectory_of,
 )
 from hippodrome.eval.exchange.drives.poses import Axes
-from hippodrome.eval.exchange.readers.raw_image import png_of
+from hippodrome.eval.exchange.readers.messages import TRUTH_TOPICS, png_of
 from hippodrome.eval.exchange.readers.spool import Spool
 
 COMPRESSED, RAW = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"
 ODOMETRY, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
-TRUTH_TOPICS = ("/ground_truth", "/groundtruth", "/gt_pose")
 
 
 def read_rosbag(path: Path, axes: Axes) -> ForeignDrive:
-    """The first topic of images, the first of odometry that is no truth, and the truth by its customary names."""
+    """Read a bag: the first topic of images, the first of odometry that is no truth, and the truth by its customary names.
+
+    Raises ExchangeError if the bag cannot be read or has no images.
+    """
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
             topics = {one.topic: one.msgtype for one in bag.connections}
@@ -51,7 +53,7 @@ def read_rosbag(path: Path, axes: Axes) -> ForeignDrive:
 
 
 def _messages(bag: AnyReader, topic: str) -> Iterator[tuple[int, Any]]:
-    """By the stamp in the header, which is the sensor's, else by the time of recording."""
+    """Time in nanoseconds and message of one topic: the header's stamp, which is the sensor's, else the time of recording."""
     for connection, recorded, raw in bag.messages([one for one in bag.connections if one.topic == topic]):
         message: Any = bag.deserialize(raw, connection.msgtype)
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec

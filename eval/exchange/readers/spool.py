@@ -15,7 +15,7 @@ class Spool:
         self._file = tempfile.TemporaryFile()  # noqa: SIM115  # closed when nobody refers to it any more
 
     def keep(self, image: bytes) -> Callable[[], bytes]:
-        """How to get the encoded image back."""
+        """Put an encoded image on disk; the answer is a function that reads it back."""
         begin = self._file.seek(0, io.SEEK_END)
         self._file.write(image)
         return partial(self._read, begin, len(image))

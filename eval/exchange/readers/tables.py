@@ -9,35 +9,33 @@ import numpy as np
 import yaml
 
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.exchange.drives.exported import ExchangeError
+from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import (
     ForeignDrive,
     ForeignFrame,
     Motion,
-    file_frame,
-    increasing,
-    inside,
     motion_table,
-    read_lines,
-    read_table,
     trajectory_of,
+    with_increasing_times,
 )
+from hippodrome.eval.exchange.drives.images import file_frame
 from hippodrome.eval.exchange.drives.poses import Axes, planar
 from hippodrome.eval.exchange.drives.tables import ODOMETRY
+from hippodrome.eval.exchange.readers.text import inside, read_lines, read_table
 
 EUROC_ODOMETRY = Path("odometry0", "data.csv")
 EUROC_TRUTH = Path("state_groundtruth_estimate0", "data.csv")
 
 
 def read_tum_folder(folder: Path, axes: Axes) -> ForeignDrive:
-    """``rgb.txt`` with its images, ``groundtruth.txt`` and ``odometry.csv`` where they exist."""
+    """Read a folder of the TUM layout: ``rgb.txt`` and its images; ``groundtruth.txt`` and ``odometry.csv`` where they exist."""
     frames = _listed(folder / "rgb.txt", None, 1.0, folder)
     truth = read_tum_poses(folder / "groundtruth.txt", axes) if (folder / "groundtruth.txt").exists() else None
     return ForeignDrive(frames, _odometry(folder / ODOMETRY), truth, None)
 
 
 def read_kitti_sequence(folder: Path, axes: Axes) -> ForeignDrive:
-    """``sequences/NN``: ``times.txt``, ``image_2`` or ``image_0``; the truth is ``../../poses/NN.txt``."""
+    """Read a folder ``sequences/NN``: ``times.txt``, ``image_2`` or ``image_0``; the truth is ``../../poses/NN.txt``."""
     t_s = read_table(folder / "times.txt", 1)[:, 0]
     images = next((folder / name for name in ("image_2", "image_0") if (folder / name).is_dir()), None)
     if images is None:
@@ -51,7 +49,7 @@ def read_kitti_sequence(folder: Path, axes: Axes) -> ForeignDrive:
 
 
 def read_euroc_folder(folder: Path, axes: Axes) -> ForeignDrive:
-    """``mav0/cam0``, ``mav0/state_groundtruth_estimate0`` and ``mav0/odometry0`` where they exist."""
+    """Read a EuRoC folder: ``mav0/cam0``; ``mav0/state_groundtruth_estimate0`` and ``mav0/odometry0`` where they exist."""
     root = folder / "mav0" if (folder / "mav0").is_dir() else folder
     frames = _listed(root / "cam0" / "data.csv", ",", 1e-9, root / "cam0" / "data")
     motion, truth = None, None
@@ -66,13 +64,13 @@ def read_euroc_folder(folder: Path, axes: Axes) -> ForeignDrive:
 
 
 def read_tum_poses(path: Path, axes: Axes) -> Trajectory:
-    """A TUM trajectory of any axes."""
+    """A TUM trajectory, ``t x y z qx qy qz qw`` a line, with attitudes of any axes."""
     table = read_table(path, 8)
     return trajectory_of(table[:, 0], table[:, 1:4], table[:, 4:8], axes, str(path))
 
 
 def read_motion(path: Path) -> Motion:
-    """``t_s,speed,yaw_rate`` a line."""
+    """Self-motion from a text file, ``t_s,speed,yaw_rate`` a line: seconds, units of length a second, radians a second."""
     table = read_table(path, 3, ",", exactly=True)
     return motion_table(table[:, 0], table[:, 1], table[:, 2], str(path))
 
@@ -82,7 +80,10 @@ def _odometry(path: Path) -> Motion | None:
 
 
 def _listed(table: Path, separator: str | None, unit_s: float, images: Path) -> list[ForeignFrame]:
-    """Frames of a list of times and file names."""
+    """The frames that a list of times and file names gives.
+
+    ``unit_s`` is the length of the list's unit of time in seconds, ``images`` the folder that its names start from.
+    """
     frames = []
     for number, line in enumerate(read_lines(table), start=1):
         if not line.strip() or line.startswith("#"):
@@ -101,7 +102,10 @@ def _listed(table: Path, separator: str | None, unit_s: float, images: Path) -> 
 
 
 def _kitti_truth(poses: Path, t_s: FloatArray, origin_file: Path, axes: Axes) -> Trajectory:
-    """Poses of the camera relative to its first; our own exports say where that was."""
+    """True poses from the camera's poses relative to its first, 12 numbers a line.
+
+    Our own exports say in ``origin_file`` where the first pose was in the road network's frame.
+    """
     table = read_table(poses, 12)
     if len(table) != len(t_s):
         raise ExchangeError(f"{poses}: {len(table)} poses for {len(t_s)} times")
@@ -109,12 +113,12 @@ def _kitti_truth(poses: Path, t_s: FloatArray, origin_file: Path, axes: Axes) ->
     found[:, :3] = table.reshape(-1, 3, 4)
     if origin_file.exists():
         placed = read_table(origin_file, 4)[:4].reshape(4, 4) @ found
-        return increasing(Trajectory(t_s, planar(placed[:, :3, 3], placed[:, :3, :3], "camera")), str(poses))
-    return increasing(Trajectory(t_s, planar(found[:, :3, 3], found[:, :3, :3], axes, world="camera")), str(poses))
+        return with_increasing_times(Trajectory(t_s, planar(placed[:, :3, 3], placed[:, :3, :3], "camera")), str(poses))
+    return with_increasing_times(Trajectory(t_s, planar(found[:, :3, 3], found[:, :3, :3], axes, world="camera")), str(poses))
 
 
 def _kitti_focal(path: Path) -> float | None:
-    """Of P2, else P0."""
+    """Focal length in pixels, from the projection matrix P2, else P0, of ``calib.txt``; None if there is no such file."""
     if not path.exists():
         return None
     rows = {line.split(":", 1)[0]: line.split(":", 1)[1].split() for line in read_lines(path) if ":" in line}
@@ -126,6 +130,7 @@ def _kitti_focal(path: Path) -> float | None:
 
 
 def _euroc_focal(path: Path) -> float | None:
+    """Focal length in pixels from ``sensor.yaml``; None if there is no such file, or no intrinsics in it."""
     if not path.exists():
         return None
     try:

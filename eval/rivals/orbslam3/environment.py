@@ -1,4 +1,4 @@
-"""A virtual environment of the tracker's own: its licence, its crashes and its packages stay out of ours."""
+"""A virtual environment for the tracker alone, so that its licence, its crashes and its packages stay out of ours."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hippodrome.core.types import HippodromeError
 
 PACKAGES = ("pyorbslam3==0.1.1", "numpy>=2.0")
 INSTALL_LIMIT_S = 600.0
-READY = ".ready"
+READY = ".ready"  # file that says that the environment is complete
 
 
 class NotInstalled(HippodromeError):
@@ -18,7 +18,7 @@ class NotInstalled(HippodromeError):
 
 
 def ensure_environment(folder: Path) -> Path:
-    """The Python of the environment in ``folder``, made if need be. Raises NotInstalled."""
+    """The Python of the environment in ``folder``, which is made if it is not there. Raises NotInstalled."""
     python = folder / "bin" / "python"
     if not (folder / READY).exists():
         _run([sys.executable, "-m", "venv", "--clear", str(folder)], "making the virtual environment")

@@ -1,6 +1,7 @@
 """Stereo pairs of a drive on disk: grey JPEG images in resumable chunks, a quarter of what colour PNG would take.
 
-A drive of 20 minutes has 15,000 pairs: 10 GB as PNG. Cameras that record for SLAM compress as well, and the tracker reads grey.
+A drive of 20 minutes has 15,000 pairs, 10 GB as PNG. The tracker uses grey images only, and cameras that record for SLAM compress
+their images as well.
 """
 
 from __future__ import annotations
@@ -14,66 +15,67 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from hippodrome._files import replacing
 from hippodrome.core.types import Frame, HippodromeError, Trajectory
 from hippodrome.sim.episode import Samples
-from hippodrome.sim.files import replacing
 from hippodrome.sim.record import RecordingPlan, draw_chunk
 from hippodrome.sim.recording import CHUNK_FRAMES, read_samples
 from hippodrome.sim.render.camera import CameraSpec
 
-QUALITY = 92  # changes a level by 1.4 of 255 in the mean: a good camera's noise
+QUALITY = 92  # JPEG's; it changes a grey level by 1.4 of 255 in the mean, as much as a good camera's noise
 
 
 @dataclass(frozen=True, slots=True)
 class StereoDrive:
-    """``frames`` consecutive stereo pairs of a drive, from number ``first`` on; those beyond need not be drawn yet."""
+    """Consecutive stereo pairs of a drive. Pairs outside of this stretch need not have been drawn."""
 
     folder: Path
     samples: Samples
     camera: CameraSpec
-    first: int
-    frames: int
+    first: int  # number of the first pair
+    frames: int  # number of pairs
 
     @property
     def times_s(self) -> list[float]:
+        """Time stamps of the pairs."""
         steps = self.samples.frame_steps[self.first : self.first + self.frames]
         return [float(t_s) for t_s in self.samples.t_s[steps]]
 
     @property
     def duration_s(self) -> float:
-        """Of the sequence: what CPU time is a share of."""
+        """Duration of the stretch, which CPU time is related to."""
         return self.frames / self.camera.rate_hz
 
     def truth(self) -> Trajectory:
-        """Body poses of the whole drive, for scoring only."""
+        """True poses of the body over the whole drive, for scoring only."""
         return Trajectory(self.samples.t_s, self.samples.poses_m)
 
     def part(self, first: int, frames: int) -> StereoDrive:
-        """A stretch of it, numbered from its own first pair."""
+        """The stretch of ``frames`` pairs from the pair ``first`` of this one on."""
         return StereoDrive(self.folder, self.samples, self.camera, self.first + first, frames)
 
     def pairs(self) -> Iterator[bytes]:
-        """Time stamp and both grey images of each frame, as the runner reads them."""
+        """Time stamp, left and right grey image of each frame, as bytes in the form that ``runner.py`` reads."""
         for number, t_s in enumerate(self.times_s, start=self.first):
             left, right = read_pair(self.folder, number)
             yield np.float64(t_s).astype("<f8").tobytes() + left.tobytes() + right.tobytes()
 
 
 def stereo_drive(plan: RecordingPlan, frames: int | None = None) -> StereoDrive:
-    """The drive of a prepared plan, or its first ``frames`` pairs."""
+    """The pairs of a prepared plan, all or the first ``frames`` of them, whether they have been drawn or not."""
     samples = read_samples(plan.folder() / "samples.npz")
     every = len(samples.frame_steps)
     return StereoDrive(plan.folder(), samples, plan.scenario.camera, 0, every if frames is None else min(frames, every))
 
 
 def missing_chunks(drive: StereoDrive) -> list[int]:
-    """Chunks that the drive needs and that are not on disk."""
+    """Numbers of the chunks of pairs that the drive needs and that are not on disk."""
     needed = range(drive.first // CHUNK_FRAMES, (drive.first + drive.frames - 1) // CHUNK_FRAMES + 1)
     return [chunk for chunk in needed if not _chunk_path(drive.folder, chunk).exists()]
 
 
 def draw_pairs(task: tuple[RecordingPlan, int]) -> None:
-    """Draw one chunk of a prepared plan to disk."""
+    """Draw one chunk of pairs to disk; the task is a prepared plan and the chunk's number."""
     plan, chunk = task
     path = _chunk_path(plan.folder(), chunk)
     with replacing(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
@@ -85,7 +87,7 @@ def draw_pairs(task: tuple[RecordingPlan, int]) -> None:
 
 
 def read_pair(folder: Path, number: int) -> tuple[Frame, Frame]:
-    """Left and right grey image (H, W). Raises HippodromeError."""
+    """Left and right grey image (H, W) of one frame. Raises HippodromeError if they are not on disk or not readable."""
     path = _chunk_path(folder, number // CHUNK_FRAMES)
     try:
         blobs = [_open(path, path.stat().st_mtime_ns).read(_name(number, side)) for side in "lr"]

@@ -10,13 +10,20 @@ from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
 from hippodrome.eval.metrics.association import check_trajectory
 
-COLUMNS = 8
+COLUMNS = 8  # t x y z qx qy qz qw
 
 
 def read_camera_tum(path: Path, forward_m: float) -> Trajectory:
-    """Body poses from a TUM file of camera poses; the camera sits ``forward_m`` ahead of the body and looks ahead.
+    """Body poses in the plane from a TUM file of camera poses in space.
 
-    For frames that it lost, the tracker writes the line before once more, old time stamp included: such lines are dropped.
+    For a frame in which it lost tracking, the tracker repeats the line before with its old time stamp: such lines are dropped.
+
+    Args:
+        path: The file.
+        forward_m: How far ahead of the body the camera sits; it looks straight ahead.
+
+    Raises:
+        HippodromeError: The file is no trajectory.
     """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -33,9 +40,14 @@ def read_camera_tum(path: Path, forward_m: float) -> Trajectory:
 
 
 def body_poses(positions_m: FloatArray, quaternions: FloatArray, forward_m: float) -> FloatArray:
-    """Planar poses (N, 3) of the body, of camera positions (N, 3) and orientations (N, 4) in x, y, z, w order.
+    """Planar poses (N, 3) of the body.
 
-    The tracker's world is its first camera: x to the right, y down, z ahead. Its plane is ours: x ahead, y to the left.
+    The tracker's world is the frame of its first camera: x to the right, y down, z ahead. The plane has x ahead, y to the left.
+
+    Args:
+        positions_m: Positions (N, 3) of the camera.
+        quaternions: Orientations (N, 4) of the camera, in the order x, y, z, w.
+        forward_m: How far ahead of the body the camera sits.
     """
     x, y, z, w = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
     ahead, right = 1.0 - 2.0 * (x * x + y * y), 2.0 * (x * z + w * y)  # the viewing direction: third column of the rotation
@@ -44,7 +56,7 @@ def body_poses(positions_m: FloatArray, quaternions: FloatArray, forward_m: floa
 
 
 def thinned(trajectory: Trajectory, spacing_m: float) -> Trajectory:
-    """The samples at which another ``spacing_m`` has been travelled, the first included."""
+    """One sample per ``spacing_m`` of the way travelled: the first of each such stretch."""
     steps = np.hypot(*np.diff(trajectory.poses[:, :2], axis=0).T)
     stretch = np.floor(np.concatenate([[0.0], np.cumsum(steps)]) / spacing_m)
     kept = np.concatenate([[True], np.diff(stretch) > 0])

@@ -1,37 +1,41 @@
-"""Runs of the tracker as rows of Table I: the run of median error, and the spread of all."""
+"""Runs of ORB-SLAM3 as rows of Table I: the run of median error, and the spread of all."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from hippodrome.core.types import HippodromeError, Trajectory
 from hippodrome.eval.files.trajectories import write_tum
-from hippodrome.eval.metrics.trajectory import ape, rpe
+from hippodrome.eval.methods.materials import score_trajectory
+from hippodrome.eval.methods.method import ORBSLAM3_FINAL, ORBSLAM3_LIVE, Method
+from hippodrome.eval.metrics.trajectory import ape
 from hippodrome.eval.results.model import Row, summarize
 from hippodrome.eval.rivals.orbslam3.pairs import StereoDrive
 from hippodrome.eval.rivals.orbslam3.poses import thinned
 from hippodrome.eval.rivals.orbslam3.tracker import Run, run_figures
 
-LIVE, FINAL = "ORB-SLAM3 (live)", "ORB-SLAM3 (final)"
-SPACING_M = 5.0  # samples as far apart as the map's vertices, so that "consecutive" means the same
-RPE_DELTA_M = 20.0
+SPACING_M: Final = 5.0  # of the scored samples: as far apart as the map's vertices, so that "consecutive" means the same
 
 Which = Literal["live", "final"]
 
 
 def failed_rows(cause: str) -> list[Row]:
     """Both rows of a tracker that never ran."""
-    return [Row(method=method, failure=cause) for method in (LIVE, FINAL)]
+    return [Row(method=method.label, failure=cause) for method in (ORBSLAM3_LIVE, ORBSLAM3_FINAL)]
 
 
 def rows(runs: Sequence[Run], drive: StereoDrive) -> list[Row]:
-    """One row for the poses as they were reported (what a vehicle would have had), one for the poses in the end."""
-    return [_row(LIVE, "live", runs, drive), _row(FINAL, "final", runs, drive)]
+    """One row for the poses as they were reported (what a vehicle would have had), one for the poses in the end.
+
+    Each row shows the run of median APE among those that ended well, has all of them in ``runs``, and fails if none did. The
+    scored samples of each run go to its folder.
+    """
+    return [_row(ORBSLAM3_LIVE, "live", runs, drive), _row(ORBSLAM3_FINAL, "final", runs, drive)]
 
 
-def _row(method: str, which: Which, runs: Sequence[Run], drive: StereoDrive) -> Row:
+def _row(method: Method, which: Which, runs: Sequence[Run], drive: StereoDrive) -> Row:
     truth = drive.truth()
     scored: list[tuple[float, Run, Trajectory]] = []
     reports: list[dict[str, object]] = []
@@ -49,30 +53,30 @@ def _row(method: str, which: Which, runs: Sequence[Run], drive: StereoDrive) -> 
                 report["failure"] = str(error)
         reports.append(report)
     if not scored:
-        return Row(method=method, failure="; ".join(str(report["failure"]) for report in reports), runs=reports)
+        return Row(method=method.label, failure="; ".join(str(report["failure"]) for report in reports), runs=reports)
     scored.sort(key=lambda item: item[0])
     _, median, samples = scored[(len(scored) - 1) // 2]
     spread = {"runs": reports, "ape_spread_m": [scored[0][0], scored[-1][0]], "median_run": median.folder.name}
-    return Row(method=method, **_errors(samples, truth), **_costs(median, drive), **spread)
+    return Row(method=method.label, **_errors(samples, truth, method), **_costs(median, drive), **spread)
 
 
 def median_run(row: Row) -> str:
-    """Name of the run that a row shows."""
+    """Name of the run that a row of ``rows`` shows."""
     name = (row.model_extra or {})["median_run"]
     assert isinstance(name, str)
     return name
 
 
 def tum_path(run: Run, which: Which) -> Path:
-    """The scored samples of a run."""
+    """File of the scored samples of a run."""
     return run.folder / f"body-{which}.tum"
 
 
-def _errors(samples: Trajectory, truth: Trajectory) -> dict[str, Any]:
-    """The convention for this tracker: the best rigid alignment, which favours it; its scale is its own, from the pair."""
+def _errors(samples: Trajectory, truth: Trajectory, method: Method) -> dict[str, Any]:
+    """Errors of the row. Its APE is that after the best rigid fit, which favours the tracker; the other fits stand beside it."""
+    scored = score_trajectory(samples, truth, method.alignment)
     fits = {f"ape_{fit}": summarize(ape(samples, truth, fit)) for fit in ("start", "se2", "sim2")}
-    return {"ape": fits["ape_se2"], **fits, "rpe": summarize(rpe(samples, truth)),
-            "rpe_20m": summarize(rpe(samples, truth, RPE_DELTA_M))}  # fmt: skip
+    return {"ape": summarize(scored.ape), **fits, "rpe": summarize(scored.rpe), "rpe_20m": summarize(scored.rpe_20m)}
 
 
 def _costs(run: Run, drive: StereoDrive) -> dict[str, Any]:

@@ -4,12 +4,12 @@
 
 The job names vocabulary, settings, width, height, whether to pace the frames, and whether to localize in the map that the
 settings load. Standard input: per frame the time stamp (float64, little endian), then the left and the right image, grey bytes.
-The working directory receives ``live.tum`` (each pose as it was when its frame came), ``steps.txt`` (per frame: time stamp,
-whether tracked, whether in the loaded map, CPU seconds so far), when mapping also ``final.tum`` and ``keyframes.tum`` (after all
-optimisation), and, last of all, ``result.json``: without it the run did not end well.
+The working directory receives ``live.tum`` (each pose as it was reported when its frame came), ``steps.txt`` (per frame: time
+stamp, whether tracked, whether in the loaded map, CPU seconds so far), after mapping also ``final.tum`` and ``keyframes.tum``
+(after all optimisation), and at the very end ``result.json``: without it the run did not end well.
 
-To localize, the tracker maps until it has merged with the loaded map, and tracks in that map alone from then on: in localization
-mode from the first frame it searches its own new and empty map only.
+To localize, the tracker maps until its map has merged with the loaded one, and from then on tracks in that map alone. If it were
+in localization mode from the first frame on, it would search its own new and empty map only.
 """
 
 import json
@@ -22,7 +22,7 @@ from typing import BinaryIO
 import numpy as np
 from pyorbslam3 import Sensor, Slam
 
-SETTLE_S = 5.0  # for local mapping and loop closing, which run behind the tracker
+SETTLE_S = 5.0  # time at the end for local mapping and loop closing, which lag behind the tracker
 
 
 def main() -> None:
@@ -87,7 +87,7 @@ def tum_line(t_s: float, pose: np.ndarray) -> str:
 
 
 def quaternion(r: np.ndarray) -> tuple[float, float, float, float]:
-    """(x, y, z, w) of a rotation (3, 3): the eigenvector of Bar-Itzhack's matrix, stable at every angle."""
+    """Quaternion (x, y, z, w) of a rotation (3, 3): an eigenvector of Bar-Itzhack's matrix, stable at every angle."""
     k = np.array([
         [r[0, 0] - r[1, 1] - r[2, 2], r[1, 0] + r[0, 1], r[2, 0] + r[0, 2], r[2, 1] - r[1, 2]],
         [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], r[2, 1] + r[1, 2], r[0, 2] - r[2, 0]],
@@ -105,7 +105,7 @@ def cpu_s() -> float:
 
 
 def peak_rss_bytes() -> int:
-    """Of this program: the kernel's ``ru_maxrss`` would count the process that started it as well."""
+    """The most memory of this process; ``ru_maxrss`` would count the process that started it as well."""
     status = Path("/proc/self/status").read_text()
     return 1024 * int(status.split("VmHWM:")[1].split()[0])
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from hippodrome.core.types import HippodromeError
 from hippodrome.sim.render.camera import CameraSpec
 
-ATLAS = "atlas"  # bare name, relative to the working directory; the tracker adds ".osa"
-FEATURES = 1200  # per image; the values below are those of the published KITTI and EuRoC settings
-# In baselines: nearer points count as close, and too few of them call for a keyframe. On 400 s of the paper's drive 60 gives
-# 1,320 keyframes, 90 gives 885 for 22 % less CPU; global bundle adjustments cost by the keyframe. Accuracy: docs/baselines.md.
+ATLAS = "atlas"  # name of the map file in the working directory; the tracker adds ".osa"
+FEATURES = 1200  # per image; the other values of the extractor are those of the published KITTI and EuRoC settings
+# Points nearer than so many baselines count as close, and the tracker makes a keyframe when it tracks too few of them. On 400 s
+# of the paper's drive, 60 gives 1,320 keyframes and 90 gives 885 for 22 % less CPU, as the cost of a global bundle adjustment
+# grows with the keyframes. What it means for accuracy is in docs/baselines.md.
 CLOSE_BASELINES = 90.0
 VIEWER = {
     "KeyFrameSize": 0.05,
@@ -25,7 +26,15 @@ VIEWER = {
 
 
 def settings_text(camera: CameraSpec, localize: bool = False) -> str:
-    """The YAML, OpenCV's dialect: pinhole without distortion; the map is saved at the end, or loaded in order to localize."""
+    """The settings file in OpenCV's dialect of YAML, for a pinhole camera without distortion.
+
+    Args:
+        camera: The stereo camera.
+        localize: Whether a map is loaded in order to localize in it; otherwise the map is saved at the end.
+
+    Raises:
+        HippodromeError: The camera is not a stereo camera.
+    """
     if camera.stereo_baseline_m is None:
         raise HippodromeError("ORB-SLAM3: camera.stereo_baseline_m is not set, a stereo pair needs a baseline")
     focal_px = camera.focal_px()

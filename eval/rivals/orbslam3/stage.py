@@ -9,6 +9,7 @@ from pathlib import Path
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.pool import Workers, process_pool
 from hippodrome.eval.results.model import Row
+from hippodrome.eval.results.table_two import LocalizedSequence, SequenceRow, failed_sequence
 from hippodrome.eval.rivals.orbslam3.environment import NotInstalled, ensure_environment
 from hippodrome.eval.rivals.orbslam3.pairs import (
     StereoDrive,
@@ -30,50 +31,55 @@ from hippodrome.eval.rivals.orbslam3.tracker import (
     run_tracker,
 )
 from hippodrome.eval.rivals.orbslam3.training import VocabularyTask, train_vocabulary
-from hippodrome.eval.rivals.sequences import Located, SequenceRow
 from hippodrome.sim.record import ROLES, RecordingPlan, prepare
 from hippodrome.sim.scenario import Scenario
 
-# The size and about the baseline of the published car data sets. Without grain most of a street's surface has no corner to track;
-# grain finer than a pixel fades by itself: drawing at twice the size, twice the time, gained less than two runs differ by.
+# Size and baseline are about those of the published car data sets. Grain gives a street's surface the corners that the tracker
+# needs. Without supersampling: drawing at twice the size takes twice the time and gained less than two runs differ by.
 STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5, "grain": True, "supersample": 1}
-TRACKER_BYTES = 7_000_000_000  # of memory, late in the paper's drive, when global bundle adjustments overlap: up to 6.6 GB
+TRACKER_BYTES = 7_000_000_000  # memory of one run: up to 6.6 GB late in the paper's drive, when global bundle adjustments overlap
 
 
 @dataclass(frozen=True, slots=True)
 class TrackerOptions:
     """How to run it."""
 
-    runs: int  # and one more if one of them ends by a fault of its own
-    seconds: float | None  # only this much of the drive
-    paced: bool
-    limit_s: float | None  # of a run
+    runs: int  # how many; one more is begun if one of them crashes or stalls
+    seconds: float | None  # only the first seconds of the drive; None: all of it
+    paced: bool  # feed frames at the camera's rate, not as fast as they are taken
+    limit_s: float | None  # time that a run may take; None: by its number of frames
 
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """Its rows of Table I with the runs that they show, and what the second drive's sequences need: the map of ``final``."""
+    """Its rows of Table I and the runs that they show; None where it never ended well."""
 
     rows: list[Row]
-    live: Run | None = None  # of median error while driving
-    final: Run | None = None  # of median error in the end
-    task: RunTask | None = None  # of ``final``
+    live: Run | None = None  # the run of median error of the poses as they were reported
+    final: Run | None = None  # the run of median error of the poses in the end; the second drive is localized in its map
+    task: RunTask | None = None  # what ``final`` was asked for
 
 
 def stereo_scenario(scenario: Scenario) -> Scenario:
-    """The same drives seen by a stereo camera at the odometry's rate: the tracker needs frames that overlap.
+    """The same drives seen by a stereo camera at the odometry's rate, as the tracker needs frames that overlap.
 
-    Town, tour, traffic and seed stay, and none of them knows the camera: the drive is the same to the last bit.
+    Town, tour, traffic and seed do not depend on the camera, so the drive is the same to the last bit.
     """
     camera = scenario.camera.model_copy(update={**STEREO, "rate_hz": scenario.odometry_rate_hz})
     return scenario.model_copy(update={"camera": camera})
 
 
 def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers) -> Tracked:
-    """Table I's rows: runs of the tracker on the mapping drive, side by side as memory has room.
+    """Run the tracker on the mapping drive several times, side by side as far as memory has room, for the rows of Table I.
 
-    One run more when the first of them crashes, begun while others still run: every second one does not survive the
-    paper's drive. No more than one, or the whole would not end within the hour.
+    Every second run does not survive the paper's drive. So when a run crashes, one more is begun while the others still run; no
+    more than one, or the whole would take longer than an hour.
+
+    Args:
+        scenario: Whose drive; its camera is replaced by a stereo camera.
+        out: Folder below which recordings, runs and the tracker's environment live. What is finished there is read back.
+        options: How to run it.
+        pool: Processes that draw the stereo pairs, and the progress display.
     """
     try:
         python = ensure_environment(out / "venv")
@@ -98,17 +104,24 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
 
 
 def _side_by_side(runs: int, pool: Workers) -> int:
-    """Runs at once: as many as the pool has processes, if memory has room for them."""
+    """How many runs at once: as many as the pool has processes, as far as memory has room for them."""
     available_bytes = 1024 * int(Path("/proc/meminfo").read_text().split("MemAvailable:")[1].split()[0])
     return max(1, min(runs, pool.processes, available_bytes // TRACKER_BYTES))
 
 
-def locate(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> list[Located]:
-    """Table II's rows: the sequences of the second drive, each in a process that loads the median run's map."""
+def locate(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> list[LocalizedSequence]:
+    """Track the sequences of the second drive for the rows of Table II, each in a process that loads the median run's map.
+
+    Args:
+        scenario: As for ``track``.
+        out: As for ``track``.
+        tracked: What ``track`` returned. Without a map, all sequences fail.
+        pool: Processes that run the tracker.
+    """
     wanted = empty_rows()
     if tracked.task is None or tracked.final is None:
         cause = tracked.rows[-1].failure or "no map"
-        return [Located(row.model_copy(update={"failure": cause})) for row in wanted]
+        return [failed_sequence(row, cause) for row in wanted]
     drive = stereo_drive(RecordingPlan(stereo_scenario(scenario), "localization", out))
     alignment = map_alignment(tracked.final, tracked.task.drive.truth())
     tasks: list[RunTask | str] = [_sequence(row, drive, tracked.task) for row in wanted]
@@ -118,12 +131,12 @@ def locate(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> li
         if isinstance(task, RunTask):
             found.append(score_sequence(row, next(runs), task, alignment, out / scenario.name))
         else:
-            found.append(Located(row.model_copy(update={"failure": task})))
+            found.append(failed_sequence(row, task))
     return found
 
 
 def _sequence(row: SequenceRow, drive: StereoDrive, mapped: RunTask) -> RunTask | str:
-    """The task, or why there is none."""
+    """The task of one sequence, or why there is none."""
     try:
         return sequence_task(row, drive, mapped)
     except HippodromeError as error:
@@ -142,7 +155,7 @@ def _prepared(scenario: Scenario, out: Path, seconds: float | None, pool: Worker
     words = VocabularyTask(stereo.camera, scenario.seed, out)
     tasks: list[VocabularyTask | tuple[RecordingPlan, int]] = [words, *((mapping, chunk) for chunk in missing_chunks(drive))]
     tasks += [(plan, chunk) for plan in others for chunk in missing_chunks(stereo_drive(plan))]
-    pool.run("pairs", _draw, tasks)  # the vocabulary takes longest and no second process can share it: first
+    pool.run("pairs", _draw, tasks)  # the vocabulary comes first: it takes longest, and a single process makes it
     return drive, words.path
 
 

@@ -1,6 +1,6 @@
 """One run of ORB-SLAM3 in a process of its own: frames in through a pipe, trajectories and figures back as files.
 
-Whatever happens to the process (crash, hang, loss of tracking) becomes a ``Run`` with a failure, never an exception.
+A process that crashes, hangs or loses tracking becomes a ``Run`` with a failure, never an exception.
 """
 
 from __future__ import annotations
@@ -19,42 +19,47 @@ from typing import IO
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
 from hippodrome.eval.rivals.orbslam3.pairs import StereoDrive
 from hippodrome.eval.rivals.orbslam3.poses import read_camera_tum
 from hippodrome.eval.rivals.orbslam3.settings import ATLAS, settings_text
-from hippodrome.proto.atomic import write_atomically
 
 RUNNER = Path(__file__).with_name("runner.py")
-LIMIT_BASE_S, LIMIT_PER_FRAME_S = 300.0, 0.8  # it takes 0.07 s a frame on a free core; ten times that is a hang
-CRASH = "crash.txt"  # why the tracker did not end; the next call does not try the run again: a crash is a result
-OWN_FAULTS = {signal.SIGABRT, signal.SIGSEGV, signal.SIGFPE, signal.SIGBUS, signal.SIGILL}  # not SIGKILL: that is want of memory
-NEW_MAP = "New Map created"  # in the log: at the start, and whenever it gave up looking for where it was
-STALL_S, LEAST_WORK = 120.0, 0.02  # of a core for so long: its threads wait for one another, as now and then late in a long drive
+# Time that a run may take: so much, and so much per frame. A frame takes 0.07 s on a free core, so ten times that is a hang.
+LIMIT_BASE_S, LIMIT_PER_FRAME_S = 300.0, 0.8
+# File in a run's folder that says why the tracker did not end. The next call does not try such a run again: a crash is a result.
+CRASH = "crash.txt"
+# Signals by which the tracker ends through a fault of its own. Not SIGKILL, by which the system ends it for want of memory.
+OWN_FAULTS = {signal.SIGABRT, signal.SIGSEGV, signal.SIGFPE, signal.SIGBUS, signal.SIGILL}
+NEW_MAP = "New Map created"  # line of the log: at the start, and whenever it gave up looking for where it was
+# A process that uses less than this share of a core over this time has stalled: its threads wait for one another, as happens now
+# and then late in a long drive.
+STALL_S, LEAST_WORK = 120.0, 0.02
 STALLED = f"hung: no work for {STALL_S:.0f} s"
-LEAST_TRACKED = 0.5  # of the frames: below, the run counts as lost
+LEAST_TRACKED = 0.5  # share of the frames; a run that tracked fewer counts as lost
 
 
 @dataclass(frozen=True, slots=True)
 class RunTask:
     """What to run, and where: a drive to map, or one to localize in the map of a finished run."""
 
-    python: Path
+    python: Path  # of the tracker's environment
     vocabulary: Path
     drive: StereoDrive
-    folder: Path
-    paced: bool = False
-    limit_s: float | None = None  # None: by the number of frames
-    loaded: Path | None = None  # folder of the run whose map is loaded
+    folder: Path  # what the run leaves goes here
+    paced: bool = False  # feed frames at the camera's rate, not as fast as they are taken
+    limit_s: float | None = None  # time that the run may take; None: by the number of frames
+    loaded: Path | None = None  # folder of the run whose map is loaded; None: map
 
 
 @dataclass(frozen=True, slots=True)
 class RunFigures:
-    """What the process measured of itself, ``runner.py``."""
+    """What the process measured of itself, in ``runner.py``."""
 
     frames: int
-    tracked: int
-    cpu_s: float  # tracking, mapping, loop closing: loading and saving excluded
+    tracked: int  # frames
+    cpu_s: float  # of tracking, mapping and loop closing; loading and saving are not counted
     loading_cpu_s: float
     wall_s: float
     longest_frame_s: float
@@ -67,26 +72,27 @@ class Steps:
     """What became of each of N frames."""
 
     t_s: FloatArray  # (N,)
-    in_map: FloatArray  # (N,) 1.0: tracked in the loaded map
-    cpu_s: FloatArray  # (N,) of the process, up to and including the frame
+    in_map: FloatArray  # (N,) 1.0 where it was tracked in the loaded map
+    cpu_s: FloatArray  # (N,) CPU time of the process up to and including the frame
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A finished run, or why it is none."""
+    """A finished run, or why it did not end well."""
 
     folder: Path
     failure: str | None = None
     figures: RunFigures | None = None
-    live: Trajectory | None = None  # body poses, in the frame of the first one, or of the loaded map
-    final: Trajectory | None = None
+    live: Trajectory | None = None  # body poses as they were reported, in the frame of the first one or of the loaded map
+    final: Trajectory | None = None  # body poses after all optimisation; None for a run that localized
     keyframes: int | None = None
-    maps_started: int | None = None  # more than one: it lost its way; maps that never merged lie anywhere to each other
+    # Maps that it began. It begins another one after it lost its way; maps that never merge have no common frame.
+    maps_started: int | None = None
     steps: Steps | None = None
 
 
 def run_tracker(task: RunTask) -> Run:
-    """The tracker over the drive; a run whose end is in its folder already is read back instead."""
+    """Run the tracker over a drive; a run that has ended already, well or by a crash, is read back from its folder."""
     folder, drive = task.folder, task.drive
     folder.mkdir(parents=True, exist_ok=True)
     if (folder / CRASH).exists():
@@ -105,12 +111,21 @@ def run_tracker(task: RunTask) -> Run:
 
 
 def own_fault(run: Run) -> bool:
-    """The tracker crashed or stalled: another run may end."""
+    """Whether the tracker crashed or stalled, so that another run may end well."""
     return (run.folder / CRASH).exists()
 
 
 def read_run(folder: Path, forward_m: float, mapped: bool = True) -> Run:
-    """A run from its files; one that localized has no final trajectory."""
+    """A run from the files in its folder.
+
+    Args:
+        folder: The run's folder.
+        forward_m: How far ahead of the body the camera sits.
+        mapped: Whether the run made a map; one that localized has no final trajectory and no keyframes.
+
+    Raises:
+        HippodromeError, OSError, ValueError, TypeError: A file is missing or is not what it should be.
+    """
     figures = RunFigures(**json.loads((folder / "result.json").read_text()))
     if figures.tracked < LEAST_TRACKED * figures.frames:
         return Run(folder, f"lost: {figures.tracked} of {figures.frames} frames tracked", figures)
@@ -125,13 +140,13 @@ def read_run(folder: Path, forward_m: float, mapped: bool = True) -> Run:
 
 
 def run_figures(run: Run) -> dict[str, object]:
-    """A run in the results file: its folder's name, its failure, its figures."""
+    """The entry of a run in the results file: its folder's name, its failure, its figures."""
     head = {"run": run.folder.name, "failure": run.failure, "maps_started": run.maps_started}
     return {**head, **(asdict(run.figures) if run.figures else {})}
 
 
 def _execute(task: RunTask) -> str | None:
-    """Start, feed and await the runner; the cause if it failed."""
+    """Start ``runner.py``, feed it and wait for its end; returns why it failed, if it did."""
     _write_job(task)
     command = [str(task.python), str(RUNNER.absolute()), "job.json"]
     paced_s = task.drive.duration_s if task.paced else 0.0
@@ -162,7 +177,7 @@ def _execute(task: RunTask) -> str | None:
 
 
 def _ended(process: subprocess.Popen[bytes], limit_s: float) -> int | str:
-    """The exit status, or why nobody waits for it any longer."""
+    """The process's exit status, or why it is not waited for any longer."""
     command, end_s = multiprocessing.parent_process(), time.monotonic() + limit_s
     marked_cpu_s, marked_s = 0.0, time.monotonic()
     while (now_s := time.monotonic()) < end_s:
@@ -188,7 +203,7 @@ def _cpu_s(pid: int) -> float:
 
 
 def _write_job(task: RunTask) -> None:
-    """What the runner reads, and a link to the map that it loads: the tracker takes bare names only."""
+    """Write what the runner reads, and a link to the map that it loads, as the tracker takes names without a folder only."""
     job = {
         "vocabulary": str(task.vocabulary.absolute()),
         "settings": "settings.yaml",
@@ -205,7 +220,7 @@ def _write_job(task: RunTask) -> None:
 
 
 def _feed(pipe: IO[bytes] | None, drive: StereoDrive) -> None:
-    """Write all frames; a reader that died ends it."""
+    """Write all frames to the runner's standard input, until the end or until the runner is gone."""
     assert pipe is not None
     with contextlib.suppress(BrokenPipeError), pipe:
         for pair in drive.pairs():

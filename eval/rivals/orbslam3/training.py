@@ -1,4 +1,4 @@
-"""Frames of other generated towns, and the vocabulary trained on them, made once and kept."""
+"""The vocabulary for ORB-SLAM3: trained on frames of other generated towns, made once and kept."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import Frame
 from hippodrome.eval.rivals.orbslam3.vocabulary import (
     BRANCHING,
@@ -17,7 +18,6 @@ from hippodrome.eval.rivals.orbslam3.vocabulary import (
     to_text,
     train,
 )
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.record import RecordingPlan, record
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scenario import DriveSpec, Scenario
@@ -26,27 +26,28 @@ from hippodrome.sim.town import TownSpec
 from hippodrome.sim.traffic import TrafficSpec
 
 KINDS: Final[tuple[Literal["grid", "radial", "random", "rural"], ...]] = ("grid", "radial", "random", "rural")
-FIRST_SEED: Final = 770_001  # of the training towns; scenarios use small seeds, and a scenario's own town is left out
-FRAME_RATE_HZ: Final = 1.0  # a frame every 5 to 10 m: neighbours share few corners
-DRIVE_M: Final = 900.0  # about 150 frames a town
+FIRST_SEED: Final = 770_001  # of the training towns; scenarios use small seeds, and a town with the scenario's seed is left out
+FRAME_RATE_HZ: Final = 1.0  # gives a frame every 5 to 10 m, so that neighbours share few corners
+DRIVE_M: Final = 900.0  # gives about 150 frames per town
 
 
 @dataclass(frozen=True, slots=True)
 class VocabularyTask:
-    """Train for this camera, unless that is on disk already; no town with this seed is looked at."""
+    """Train a vocabulary for a camera, unless it is on disk already."""
 
     camera: CameraSpec
-    scenario_seed: int
-    root: Path
+    scenario_seed: int  # a town with this seed is not looked at
+    root: Path  # the vocabulary and its training frames live below ``root/vocabulary``
 
     @property
     def path(self) -> Path:
+        """The vocabulary's file."""
         size = f"{self.camera.width}x{self.camera.height}-{self.camera.fov_deg:g}deg{'-grain' if self.camera.grain else ''}"
         return self.root / "vocabulary" / f"orb-k{BRANCHING}-L{DEPTH}-{size}.txt"  # the tracker reads text by the suffix
 
 
 def train_vocabulary(task: VocabularyTask) -> Path:
-    """The vocabulary file."""
+    """Train the vocabulary if it is not on disk; returns its file."""
     if not task.path.exists():
         descriptors, image = orb_descriptors(_training_frames(task))
         task.path.parent.mkdir(parents=True, exist_ok=True)

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from hippodrome.core.types import FloatArray, Frame, HippodromeError, IntArray, UInt8Array
 
-BRANCHING, DEPTH = 10, 5  # the published vocabulary's is 10 and 6; four levels are too shallow to tell places apart
+BRANCHING, DEPTH = 10, 5  # the published vocabulary has 10 and 6; a depth of four is too shallow to tell places apart
 DESCRIPTOR_BYTES = 32
 FEATURES_PER_IMAGE = 500
-SWEEPS = 12  # of k-majority per node; assignments hardly change after ten
-FEW = 8  # times the branching: so few descriptors may hold fewer distinct ones than clusters
-LEAST_WEIGHT = 1e-3  # a word of every image says nothing, but DBoW2 takes a weight of zero for a stopped word
+SWEEPS = 12  # iterations of k-majority per node at most; assignments hardly change after ten
+FEW = 8  # up to so many descriptors per cluster, equal ones are looked for: there may be fewer distinct ones than clusters
+LEAST_WEIGHT = 1e-3  # of a word that all images have; it tells nothing, but DBoW2 takes a weight of zero for a stopped word
 
 Bits: TypeAlias = NDArray[np.float32]
 Members: TypeAlias = NDArray[np.intp]
@@ -33,14 +33,21 @@ class Vocabulary:
 
     branching: int
     depth: int
-    parent: IntArray  # (K,) DBoW2 number, 0: the root
+    parent: IntArray  # (K,) DBoW2's number of the parent; 0 is the root
     is_leaf: NDArray[np.bool_]  # (K,)
     descriptor: UInt8Array  # (K, 32)
     weight: FloatArray  # (K,) ln(images / images with the word) of leaves
 
 
 def orb_descriptors(frames: Iterable[Frame]) -> tuple[UInt8Array, IntArray]:
-    """ORB descriptors (N, 32) of RGB frames, and the number of the frame that each is from (N,)."""
+    """ORB descriptors of RGB frames.
+
+    Returns:
+        Descriptors (N, 32), and for each (N,) the number of the frame that it is from.
+
+    Raises:
+        HippodromeError: No frame has a corner.
+    """
     extractor = cv2.ORB.create(FEATURES_PER_IMAGE)
     found, image = [], []
     for number, frame in enumerate(frames):
@@ -56,7 +63,15 @@ def orb_descriptors(frames: Iterable[Frame]) -> tuple[UInt8Array, IntArray]:
 def train(
     descriptors: UInt8Array, image: IntArray, rng: np.random.Generator, branching: int = BRANCHING, depth: int = DEPTH
 ) -> Vocabulary:
-    """Split the descriptors (N, 32) into ``branching`` clusters, these again, ``depth`` times (Nister & Stewenius 2006)."""
+    """Hierarchical clustering into a vocabulary tree, Nister & Stewenius 2006: clusters are split again, level by level.
+
+    Args:
+        descriptors: Training descriptors (N, 32).
+        image: The number of the image that each is from (N,), ascending.
+        rng: Chooses the first centres.
+        branching: Clusters that a node is split into.
+        depth: Levels of the tree.
+    """
     parent, leaf, centre, weight = [], [], [], []
     everything: Members = np.arange(len(descriptors))
     waiting = deque([(0, 0, everything)])
@@ -75,7 +90,10 @@ def train(
 
 
 def to_text(vocabulary: Vocabulary) -> str:
-    """DBoW2's text: ``k L 0 0`` (L1 norm, TF-IDF), then ``parent isLeaf b0 ... b31 weight`` a node; no newline at the end."""
+    """DBoW2's text format: ``k L 0 0`` (L1 norm, TF-IDF), then ``parent isLeaf b0 ... b31 weight`` per node.
+
+    There is no newline at the end, as DBoW2 would read another node after it.
+    """
     lines = [f"{vocabulary.branching} {vocabulary.depth} 0 0"]
     nodes = zip(vocabulary.parent, vocabulary.is_leaf, vocabulary.descriptor, vocabulary.weight, strict=True)
     lines += [f"{parent} {int(leaf)} {' '.join(map(str, bytes_))} {weight:.6g}" for parent, leaf, bytes_, weight in nodes]
@@ -90,7 +108,7 @@ def _weight(image: IntArray, members: Members) -> float:
 def _split(
     descriptors: UInt8Array, members: Members, branching: int, rng: np.random.Generator
 ) -> list[tuple[Members, UInt8Array]]:
-    """Clusters of ``members`` and their centres (32,): every distinct descriptor by itself where there are few."""
+    """Clusters of ``members`` and their centres (32,); if there are few distinct descriptors, each is a cluster of its own."""
     bits = _bits(descriptors[members])
     distinct = _bits(_distinct(descriptors[members])) if len(members) <= FEW * branching else bits
     centres = distinct if len(distinct) <= branching else _k_majority(bits, distinct, branching, rng)
@@ -120,7 +138,7 @@ def _nearest(bits: Bits, centres: Bits) -> Members:
 
 
 def _distinct(descriptors: UInt8Array) -> UInt8Array:
-    """Each descriptor (N, 32) once; as one opaque value a row, which sorts fast."""
+    """The distinct descriptors of (N, 32). Each row is viewed as one opaque value, which sorts fast."""
     rows = np.ascontiguousarray(descriptors).view(f"V{DESCRIPTOR_BYTES}").ravel()
     return np.unique(rows).view(np.uint8).reshape(-1, DESCRIPTOR_BYTES)
 

@@ -15,35 +15,40 @@ from hippodrome.core.types import EdgeKind, Edges, FloatArray
 class ExperienceConfig:
     """OpenRatSLAM's values."""
 
-    code_threshold: float = 1.0  # cells: a pose code this near to an experience's is the same place
-    correction: float = 0.5  # alpha: share of a link's error by which each of its ends moves
-    sweeps: int = 20  # relaxation sweeps per change of experience
+    code_threshold: float = 1.0  # cells; a pose code that is nearer to an experience's is at the same place
+    correction: float = 0.5  # alpha; share of a link's error by which each of its ends is moved
+    sweeps: int = 20  # relaxation sweeps whenever another experience becomes active
 
 
 class ExperienceMap:
-    """The graph and the motion since the experience that is active."""
+    """The graph of experiences, and the self-motion since the active one became active."""
 
     def __init__(self, config: ExperienceConfig) -> None:
         self._config = config
         self._since: FloatArray = np.zeros(3)
         self._links: dict[tuple[int, int], FloatArray] = {}
         self._edges = _edges(self._links)
-        self.poses: FloatArray = np.zeros((0, 3))  # (V, 3) map units
-        self.codes: FloatArray = np.zeros((0, 3))  # (V, 3) pose codes
-        self.templates: list[int] = []  # (V,)
-        self.active = -1
+        self.poses: FloatArray = np.zeros((0, 3))  # (V, 3) of the experiences, in map units
+        self.codes: FloatArray = np.zeros((0, 3))  # (V, 3) their pose codes
+        self.templates: list[int] = []  # (V,) their view templates
+        self.active = -1  # number of the active experience; -1 before the first
 
     @property
     def links(self) -> Edges:
-        """All links."""
+        """All links between experiences."""
         return self._edges
 
     def move(self, motion: FloatArray) -> None:
-        """Self-motion (3,) of the body."""
+        """Add a self-motion (3,) of the body."""
         self._since = se2.compose(self._since, motion)
 
     def create(self, template: int, code: FloatArray) -> None:
-        """A new experience where dead reckoning from the active one says, linked to it; it becomes the active one."""
+        """Make a new experience where dead reckoning from the active one leads to, linked to that one; it becomes active.
+
+        Args:
+            template: The view template that is seen.
+            code: The present pose code (3,).
+        """
         before, created = self.active, len(self.templates)
         pose = se2.compose(self.poses[before], self._since) if before >= 0 else np.zeros(3)
         self.poses, self.codes = np.vstack([self.poses, pose]), np.vstack([self.codes, code])
@@ -53,12 +58,17 @@ class ExperienceMap:
         self.active, self._since = created, np.zeros(3)
 
     def revisit(self, experience: int, heading_rad: float) -> None:
-        """An old experience becomes active, linked to the one before; the vehicle's heading there differs by ``heading_rad``."""
+        """Make an old experience active, with a link from the one before.
+
+        Args:
+            experience: Its number.
+            heading_rad: The vehicle's heading relative to the heading that the experience was made with.
+        """
         self._link(self.active, experience, se2.compose(self._since, np.array([0.0, 0.0, -heading_rad])))
         self.active, self._since = experience, np.array([0.0, 0.0, heading_rad])
 
     def relax(self) -> None:
-        """Eqs. (9)-(10), Milford & Wyeth 2008, a few sweeps; the first experience stays at the origin."""
+        """Relax the map by a few sweeps, Eqs. (9)-(10), Milford & Wyeth 2008. The first experience stays at the origin."""
         share_of_both_ends = 2.0 * self._config.correction
         self.poses = relax_ratslam(self.poses, self._edges, share_of_both_ends, self._config.sweeps)
 
@@ -69,7 +79,7 @@ class ExperienceMap:
 
 
 def _edges(links: dict[tuple[int, int], FloatArray]) -> Edges:
-    """Links as edges; RatSLAM weighs all alike, so that their deviations are ones. A link back to an older one is a closure."""
+    """Links as edges. RatSLAM weighs all alike, so standard deviations are one; a link to an older experience is a closure."""
     count = len(links)
     ends = np.array(list(links), dtype=np.int32).reshape(count, 2)
     source, target = np.ascontiguousarray(ends[:, 0]), np.ascontiguousarray(ends[:, 1])

@@ -1,7 +1,7 @@
 """RatSLAM's pose cells: a three-dimensional continuous attractor network over x, y and heading, each axis closed to a ring.
 
-Milford & Wyeth 2004 and 2008, constants of OpenRatSLAM (Ball et al. 2013). One activity packet moves with self-motion; activity
-injected by a familiar view competes with it. A pose code (3,) is (x, y, heading) in cells.
+Milford & Wyeth 2004 and 2008, with the constants of OpenRatSLAM (Ball et al. 2013). One packet of activity moves with
+self-motion; activity that a familiar view injects competes with it. A pose code (3,) is (x, y, heading) in cells.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ class PoseCellConfig:
     """Size of the network and its weights. All values are OpenRatSLAM's, those of its road data set where data sets differ."""
 
     cells_xy: int = 30
-    cells_heading: int = 36  # 10 deg each
-    excitation_width: int = 7  # cells; the Gaussian is cut off outside
+    cells_heading: int = 36  # of 10 deg each
+    excitation_width: int = 7  # cells beyond which the Gaussian is cut off
     excitation_sigma: float = 1.0
     inhibition_width: int = 5
     inhibition_sigma: float = 2.0
-    global_inhibition: float = 0.00002  # taken from every cell per step
-    averaged_reach: int = 3  # cells on either side of the peak that the read-out averages
+    global_inhibition: float = 0.00002  # subtracted from every cell in each step
+    averaged_reach: int = 3  # cells on either side of the peak over which the read-out averages
 
 
 def start(config: PoseCellConfig) -> FloatArray:
-    """Activity (headings, y, x), all of it in the cell in the middle, at heading cell 0."""
+    """Initial activity (headings, y, x): all of it in the middle cell of x and y, at heading cell 0."""
     cells = np.zeros((config.cells_heading, config.cells_xy, config.cells_xy))
     cells[0, config.cells_xy // 2, config.cells_xy // 2] = 1.0
     return cells
 
 
 def inject(cells: FloatArray, code: FloatArray, energy: float) -> FloatArray:
-    """Activity added at the pose code that a familiar view is associated with (Sec. III-B, Milford & Wyeth 2008)."""
+    """Activity with ``energy`` added at a pose code (3,), that of a familiar view (Sec. III-B, Milford & Wyeth 2008)."""
     x, y, heading = (int(c) % n for c, n in zip(np.floor(code + 0.5), cells.shape[::-1], strict=True))
     injected = cells.copy()
     injected[heading, y, x] += energy
@@ -58,13 +58,19 @@ def attract(cells: FloatArray, config: PoseCellConfig) -> FloatArray:
 
 
 def path_integrate(cells: FloatArray, distance: float, turn_rad: float) -> FloatArray:
-    """The packet moved by self-motion, Eqs. (5)-(6), Milford & Wyeth 2008: each heading's layer along its own direction."""
+    """Activity moved by self-motion, Eqs. (5)-(6), Milford & Wyeth 2008: each layer of cells along its own heading.
+
+    Args:
+        cells: Activity (headings, y, x).
+        distance: Distance travelled, in cells.
+        turn_rad: Turn.
+    """
     moved: FloatArray = _turned(_advanced(cells, distance), turn_rad * len(cells) / (2.0 * np.pi))
     return moved
 
 
 def read_out(cells: FloatArray, config: PoseCellConfig) -> FloatArray:
-    """Pose code (3,) of the packet: the circular mean of the cells around the most active one."""
+    """Pose code (3,) of the packet of activity: the circular mean of the cells around the most active one."""
     peak = np.unravel_index(int(np.argmax(cells)), cells.shape)
     reach = np.arange(-config.averaged_reach, config.averaged_reach + 1)
     box = cells[np.ix_(*[(p + reach) % n for p, n in zip(peak, cells.shape, strict=True)])]
@@ -75,7 +81,7 @@ def read_out(cells: FloatArray, config: PoseCellConfig) -> FloatArray:
 
 
 def code_distance(a: FloatArray, b: FloatArray, config: PoseCellConfig) -> FloatArray:
-    """Euclidean distance (N,) in cells between pose codes (N, 3) and (3,), the short way round each ring."""
+    """Euclidean distance (N,) in cells between pose codes (N, 3) and (3,), along the shorter way round each ring."""
     size = np.array([config.cells_xy, config.cells_xy, config.cells_heading])
     apart = np.mod(a - b, size)
     distance: FloatArray = np.linalg.norm(np.minimum(apart, size - apart), axis=-1)
@@ -83,7 +89,7 @@ def code_distance(a: FloatArray, b: FloatArray, config: PoseCellConfig) -> Float
 
 
 def gaussian(width: int, sigma: float) -> FloatArray:
-    """One axis (width,) of the separable weights, summing to one."""
+    """Weights (width,) along one axis, which sum to one; the Gaussian is separable."""
     offset = np.arange(width) - width // 2
     weights = np.exp(-(offset**2) / (2.0 * sigma**2))
     normalised: FloatArray = weights / weights.sum()
@@ -92,7 +98,7 @@ def gaussian(width: int, sigma: float) -> FloatArray:
 
 @njit(cache=True)
 def _spread(cells: FloatArray, weights: FloatArray) -> FloatArray:
-    """Circular convolution along all three axes, from the active cells only."""
+    """Circular convolution with ``weights`` along all three axes, one after the other; cells without activity are skipped."""
     headings, rows, columns = cells.shape
     half = len(weights) // 2
     along_x, along_y, spread = np.zeros_like(cells), np.zeros_like(cells), np.zeros_like(cells)
@@ -118,7 +124,7 @@ def _spread(cells: FloatArray, weights: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def _advanced(cells: FloatArray, distance: float) -> FloatArray:
-    """Every layer shifted ``distance`` cells along its heading; what falls between cells is shared among the four around it."""
+    """Activity with every layer shifted by ``distance`` cells along its heading; the four cells around a new place share it."""
     headings, rows, columns = cells.shape
     advanced = np.zeros_like(cells)
     for h in range(headings):
@@ -141,7 +147,7 @@ def _advanced(cells: FloatArray, distance: float) -> FloatArray:
 
 @njit(cache=True)
 def _turned(cells: FloatArray, layers: float) -> FloatArray:
-    """All layers shifted by ``layers`` heading cells."""
+    """Activity shifted by ``layers`` heading cells; the two layers around a new heading share it."""
     headings = len(cells)
     low = int(np.floor(layers))
     share = layers - low

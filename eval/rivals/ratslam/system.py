@@ -1,8 +1,8 @@
 """Classical RatSLAM, the ancestor of the cognitive map: frames and self-motion in, an experience map out.
 
 Milford & Wyeth, "Mapping a suburb with a single camera using a biologically inspired SLAM system", 2008; OpenRatSLAM, Ball et
-al. 2013. Written from the published equations. One deviation: the side of a pose cell is a share of the typical way per time, as
-the unit of the odometry is unknown, where OpenRatSLAM sets metres by hand for each data set.
+al. 2013. Written from the published equations. One deviation: OpenRatSLAM sets the side of a pose cell by hand in metres for each
+data set; here the unit of the odometry is unknown, so it is the distance that the vehicle typically travels in a given time.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hippodrome.core.types import Edges, FloatArray, HippodromeError, IntArray, Observation, Trajectory, UInt8Array
-from hippodrome.core.views import keyframes as view_step
-from hippodrome.core.views.keyframes import ViewStepConfig
+from hippodrome.core.views import keyframes
+from hippodrome.core.views.keyframes import KeyframeConfig
 from hippodrome.eval.rivals.ratslam import pose_cells
 from hippodrome.eval.rivals.ratslam.experiences import ExperienceConfig, ExperienceMap
 from hippodrome.eval.rivals.ratslam.pose_cells import PoseCellConfig
@@ -22,29 +22,29 @@ from hippodrome.eval.rivals.ratslam.views import Recognised, ViewConfig, ViewTem
 
 @dataclass(frozen=True)
 class RatSlamConfig:
-    """Every constant, each declared beside its algorithm."""
+    """Every constant of RatSLAM, each declared beside its algorithm."""
 
     pose_cells: PoseCellConfig = field(default_factory=PoseCellConfig)
     views: ViewConfig = field(default_factory=ViewConfig)
     experiences: ExperienceConfig = field(default_factory=ExperienceConfig)
-    speed: ViewStepConfig = field(default_factory=lambda: ViewStepConfig(interval_s=0.25))  # a cell: 2 m at 30 km/h
+    speed: KeyframeConfig = field(default_factory=lambda: KeyframeConfig(interval_s=0.25))  # a cell: 2 m at 30 km/h
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RatSlamMap:
-    """The finished map, in map units, the first experience at the origin."""
+    """The finished map, in map units, with the first experience at the origin."""
 
-    poses: FloatArray  # (V, 3) experiences
-    codes: FloatArray  # (V, 3) their pose codes, cells
-    template: IntArray  # (V,) their views
+    poses: FloatArray  # (V, 3) of the experiences
+    codes: FloatArray  # (V, 3) their pose codes, in cells
+    template: IntArray  # (V,) their view templates
     links: Edges
     images: UInt8Array  # (C, D) view templates
-    visit_t_s: FloatArray  # (S,) when an experience became active
-    visit: IntArray  # (S,) which one
+    visit_t_s: FloatArray  # (S,) times at which an experience became active
+    visit: IntArray  # (S,) number of the experience that became active
 
     @property
     def trajectory(self) -> Trajectory:
-        """Where the finished map says the vehicle was, whenever it came to an experience."""
+        """Where the vehicle was according to the finished map, at the times at which an experience became active."""
         return Trajectory(self.visit_t_s, self.poses[self.visit])
 
 
@@ -53,7 +53,7 @@ class RatSlam:
 
     def __init__(self, config: RatSlamConfig) -> None:
         self._config = config
-        self._speeds = view_step.start()
+        self._speeds = keyframes.start()
         self._cells = pose_cells.start(config.pose_cells)
         self._templates = ViewTemplates(config.views)
         self._map = ExperienceMap(config.experiences)
@@ -61,7 +61,7 @@ class RatSlam:
         self._template = -1
 
     def step(self, observation: Observation) -> None:
-        """A view, the pose cells, the experience map: the three parts in the order of the publication."""
+        """One observation: the view templates, the pose cells and the experience map, in the order of the publication."""
         code = pose_cells.read_out(self._cells, self._config.pose_cells)
         seen = None if observation.frame is None else self._templates.recognise(observation.frame, code)
         if seen is not None:
@@ -71,7 +71,7 @@ class RatSlam:
             self._experience(seen, observation.t_s)
 
     def finish(self) -> RatSlamMap:
-        """The experience map of everything seen."""
+        """The experience map of all observations. Raises HippodromeError if none had a frame."""
         if not self._visits:
             raise HippodromeError("RatSLAM: the drive has no frame")
         t_s, visit = zip(*self._visits, strict=True)
@@ -95,14 +95,14 @@ class RatSlam:
 
     def _integrate_paths(self, observation: Observation) -> None:
         length, turn_rad = observation.speed * observation.dt_s, observation.yaw_rate_radps * observation.dt_s
-        self._speeds = view_step.advance(self._speeds, observation, self._config.speed)
-        self._map.move(view_step.arc(length, turn_rad))
+        self._speeds = keyframes.advance(self._speeds, observation, self._config.speed)
+        self._map.move(keyframes.arc_motion(length, turn_rad))
         distance = length / self._speeds.spacing if self._speeds.spacing > 0.0 else 0.0
         cells = pose_cells.attract(self._cells, self._config.pose_cells)
         self._cells = pose_cells.path_integrate(cells, distance, turn_rad)
 
     def _experience(self, seen: Recognised, t_s: float) -> None:
-        """Stay, go back to an old experience, or make a new one, as view and pose code together say."""
+        """Stay at the active experience, go back to an old one, or make a new one, by view and pose code together."""
         code, places = pose_cells.read_out(self._cells, self._config.pose_cells), self._map
         same_view, self._template = seen.template == self._template, seen.template
         apart = pose_cells.code_distance(places.codes, code, self._config.pose_cells)

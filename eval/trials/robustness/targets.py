@@ -1,4 +1,4 @@
-"""The localizer's figures held against what they must be and what they should be."""
+"""What the localizer's figures must be and what they should be, and how the figures of a run stand to that."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-SUN_AND_FOG: Final = "sun-opposite-fog-80m"
-FALSE_LIMIT: Final = 0.01  # of all sequences
+from hippodrome.eval.trials.robustness.conditions import SAME, SUN_AND_FOG
+
+FALSE_LIMIT: Final = 0.01  # share of all sequences that may have a false fix
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """``most``: the figure has to stay below; otherwise above."""
+    """One figure, what it must be, and what it should be."""
 
     item: str
-    value: float | None  # None: not measured by this run
+    value: float | None  # None: this run did not measure it
     must: float
     aim: float
-    most: bool
+    most: bool  # True: the figure has to stay below ``must`` and ``aim``; False: above
     unit: str
 
     @property
@@ -49,15 +50,22 @@ def targets(
     mapped: dict[str, Any], everywhere: Sequence[dict[str, Any]], places: Sequence[dict[str, Any]], paper: dict[str, Any],
     kidnapped: dict[str, Any], measured: dict[str, Any],
 ) -> list[Target]:  # fmt: skip
-    """The table, from the summaries of the run: ``mapped`` pools all conditions, ``everywhere`` has a row for each, another
-    town's among them.
+    """All targets with the figures of a run.
+
+    Args:
+        mapped: Figures pooled over all conditions in the mapped town.
+        everywhere: One row for each condition, another town's among them.
+        places: One row of place recognition for each condition.
+        paper: Figures pooled over the paper's ten lengths.
+        kidnapped: Figures pooled over all kidnappings.
+        measured: ``step_ms``, ``look_ms`` and ``bytes_per_view``.
     """
-    same = next((row for row in everywhere if row["condition"] == "same"), None)
+    same = next((row for row in everywhere if row["condition"] == SAME), None)
     recalls = {row["condition"]: next(iter(row["recognisers"].values()))["recall"] for row in places}
     false_share = sum(row["false_sequences"] for row in everywhere) / sum(row["sequences"] for row in everywhere)
     return [
         Target("error after initial localization, same condition, paper's lengths", paper["error_mean_m"], 1.5, 0.7, True, "m"),
-        Target("place recognition, recall at 99 %, same condition", _percent(recalls.get("same")), 90.0, 97.0, False, "%"),
+        Target("place recognition, recall at 99 %, same condition", _percent(recalls.get(SAME)), 90.0, 97.0, False, "%"),
         Target("place recognition, recall at 99 %, sun + fog", _percent(recalls.get(SUN_AND_FOG)), 75.0, 95.0, False, "%"),
         Target("success within 200 m, same condition", _percent(same["success_share"] if same else None), 95.0, 99.0, False, "%"),
         Target("success within 200 m, all conditions", _percent(mapped["success_share"]), 80.0, 95.0, False, "%"),
@@ -71,13 +79,9 @@ def targets(
     ]  # fmt: skip
 
 
-def markdown(found: Sequence[Target]) -> str:
-    """One row a target."""
-    lines = ["## Against the targets", "", "| item | measured | must | aim | |", "|---|---|---|---|---|"]
-    for target in found:
-        bounds = f"{target.must:g} {target.unit} | {target.aim:g} {target.unit}"
-        lines.append(f"| {target.item} | {target.with_unit} | {bounds} | {target.verdict} |")
-    return "\n".join([*lines, ""])
+def worst(found: Sequence[Target]) -> Target | None:
+    """The town that misses a target by most, of the same target's figures in several towns; None if no town measured it."""
+    return max((one for one in found if one.value is not None), key=lambda one: one.shortfall, default=None)
 
 
 def _percent(share: float | None) -> float | None:

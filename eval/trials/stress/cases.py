@@ -8,17 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
-from hippodrome.proto.atomic import write_atomically
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS, NoiseLevel, SelfMotionNoise
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.town import CONVERT_OPTIONS, TownSpec
 
-MISSING_ROADS = 2  # driven streets taken out of the network, both directions each
-FOREIGN_SEED = 1_000_003  # added to a town's own: a town of the same kind, where the drive never was
-GRID_CROSSINGS: Final = 4  # in each direction, ..
-GRID_BLOCK_M: Final = 80.0  # .. this far apart: as large as the other towns, and every block like every other
+MISSING_ROADS: Final = 2  # driven streets that are taken out of the network, both directions of each
+FOREIGN_SEED: Final = 1_000_003  # added to the scenario's seed: a town of the same kind, where the drive never was
+# Crossings of the self-similar grid in each direction, and the way between two: as large as the other towns, all blocks alike.
+GRID_CROSSINGS: Final = 4
+GRID_BLOCK_M: Final = 80.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,18 +27,18 @@ class StressCase:
     """One thing that goes wrong."""
 
     name: str
-    noise: NoiseLevel = "paper"
-    false_closures: float = 0.0  # share of the map's closures, added between random vertices
-    survey_error_m: float = 0.0
-    scale_jump: float = 0.0  # standard deviation of ln(scale) at each jump
-    gyro_bias_degps: float | None = None
-    missing_roads: int = 0
-    foreign: bool = False  # the network is that of another town
-    self_similar: bool = False  # the town is a grid of equal blocks; one a seed, whatever the scenario's town
-    start_known: bool = False  # the first pose is given
+    noise: NoiseLevel = "paper"  # level of the self-motion's errors
+    false_closures: float = 0.0  # false loop closures added between random vertices, as a share of the map's own
+    survey_error_m: float = 0.0  # standard deviation of the road network's displacement
+    scale_jump: float = 0.0  # standard deviation of ln(scale) at each jump of the monocular scale
+    gyro_bias_degps: float | None = None  # bias of the yaw rate; None: the level's
+    missing_roads: int = 0  # driven streets that the road network lacks
+    foreign: bool = False  # whether the road network is that of another town
+    self_similar: bool = False  # whether the town is a grid of equal blocks, one a seed, whatever the scenario's town
+    start_known: bool = False  # whether the first pose is given to the refinement
 
     def self_motion(self) -> SelfMotionNoise:
-        """The noise that the odometry is sensed with."""
+        """The errors that the self-motion is sensed with."""
         level = NOISE_LEVELS[self.noise]
         changed: dict[str, float] = {"scale_jump": max(self.scale_jump, level.scale_jump)}
         if self.gyro_bias_degps is not None:
@@ -63,7 +64,7 @@ CASES = (
 
 
 def chosen_cases(names: Sequence[str]) -> tuple[StressCase, ...]:
-    """The cases of these names, all if there are none."""
+    """The cases of these names, all of them if no name is given. Raises HippodromeError if there is no case of a name."""
     if unknown := set(names) - {case.name for case in CASES}:
         raise HippodromeError(f"no stress case '{sorted(unknown)[0]}'; there are: {', '.join(case.name for case in CASES)}")
     return tuple(case for case in CASES if not names or case.name in names)

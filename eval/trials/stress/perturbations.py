@@ -14,7 +14,11 @@ from hippodrome.sim.recording import Recording
 
 
 def with_false_closures(cognitive_map: CognitiveMap, share: float, rng: np.random.Generator) -> CognitiveMap:
-    """The map with closures between random vertices added, as many as ``share`` of its own, as confident as these."""
+    """The map with false loop closures added between random vertices.
+
+    There are ``share`` times as many of them as the map has closures of its own, and they are as confident: motion, sigma and
+    margin are those of closures of the map drawn at random.
+    """
     edges = cognitive_map.edges
     own = np.flatnonzero(edges.kind == EdgeKind.CLOSURE)
     count = round(share * len(own))
@@ -56,7 +60,10 @@ def without_roads(network: RoadNetwork, edges: Sequence[int]) -> RoadNetwork:
 
 
 def driven_streets(recording: Recording, network: RoadNetwork, count: int, rng: np.random.Generator) -> list[int]:
-    """Edges of ``count`` streets that were driven, with their opposite directions where these have the mirrored end points."""
+    """Edges of ``count`` streets that were driven, drawn at random, with the edges of their opposite directions.
+
+    An edge is the opposite direction of another if it begins near where the other ends, and ends near where it begins.
+    """
     driven = np.unique(network.lane_edge[recording.samples.lane[~network.is_internal[recording.samples.lane]]])
     if count == 0:
         return []

@@ -108,13 +108,13 @@ def test_paper_mode_holds_the_total_at_e(conflict, r_inte, r_cali, ticks):
     assert (r > 0.0).all()
 
 
-def test_paper_mode_destroys_the_uniform_start_and_default_keeps_it():
+def test_paper_mode_destroys_the_uniform_start_and_bounded_keeps_it():
     flat = shaped(1e-4, 1e-4)
     assert attractor.inhibit(shaped(0, 0), flat, 0.1, paper_config(), np.array([100.0])).sum() == pytest.approx(100.0)
     assert_allclose(attractor.inhibit(shaped(0, 0), flat, 0.1, AttractorConfig(), np.array([100.0])), flat)
 
 
-def test_default_inhibition_spares_agreement_and_settles_conflict():
+def test_bounded_inhibition_spares_agreement_and_settles_conflict():
     config, total = AttractorConfig(inhibition_calibration=0.1, inhibition_integrator=0.1), np.array([100.0])
     agreeing = attractor.inhibit(shaped(0.3, 0.3), shaped(60.0, 20.0), 0.1, config, total)
     assert_allclose(agreeing, shaped(60.0, 20.0))
@@ -124,7 +124,7 @@ def test_default_inhibition_spares_agreement_and_settles_conflict():
     assert fighting[0, 1, 0] < 1e-3 < 50.0 < fighting[0, 0, 0]
 
 
-def test_default_inhibition_does_not_depend_on_the_tick_rate():
+def test_bounded_inhibition_does_not_depend_on_the_tick_rate():
     config, total, mean = AttractorConfig(), np.array([100.0]), shaped(0.0, 1.5)
     slow, fast = shaped(60.0, 20.0), shaped(60.0, 20.0)
     for _ in range(20):

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from hippodrome.core.localization import gyro as gyro_noise
-from hippodrome.core.localization.gyro import GyroNoise
+from hippodrome.core.localization.gyro import GyroNoise, update
 
 LEAST = 1e-3
 
@@ -12,7 +11,7 @@ LEAST = 1e-3
 def estimates(yaw_rate):
     state, sigmas = GyroNoise(), []
     for sample in yaw_rate:
-        state = gyro_noise.update(state, sample, LEAST)
+        state = update(state, sample, LEAST)
         sigmas.append(state.sigma_radps)
     return np.array(sigmas)
 

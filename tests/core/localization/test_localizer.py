@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hippodrome.core.localization.beliefs.attractor import AttractorPose
-from hippodrome.core.localization.beliefs.kalman import KalmanPose
-from hippodrome.core.localization.beliefs.motion import Motion
-from hippodrome.core.localization.config import Injection
+from hippodrome.core.localization.beliefs.attractor import AttractorBelief
+from hippodrome.core.localization.beliefs.kalman import KalmanBelief
+from hippodrome.core.localization.beliefs.motion import Motion, PoseMeasurement
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig, localize
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import HippodromeError, LocalizationStatus, Observation
@@ -128,7 +127,7 @@ def test_standing_adds_no_doubt_and_no_uncertainty():
     assert np.trace(estimates[-1].covariance[:2, :2]) < 1.5 * np.trace(estimates[0].covariance[:2, :2])
 
 
-def test_a_second_look_from_the_same_spot_is_no_second_witness():
+def test_a_second_query_frame_from_the_same_spot_is_no_second_witness():
     observations, _ = drive(PICTURES, np.random.default_rng(11), 137.0, 100.0)
     still = [replace(observation, speed=0.01, yaw_rate_radps=0.0) for observation in observations]
     shuffled = [replace(one, frame=observations[1].frame) for one in still if one.frame is not None]
@@ -148,15 +147,14 @@ def test_a_place_that_is_not_what_is_seen_is_doubted():
     assert statuses.index(LocalizationStatus.DOUBTED) * 0.8 < 50.0
 
 
-@pytest.mark.parametrize("pose_type", [AttractorPose, KalmanPose])
-def test_an_outlier_in_the_same_place_neither_unseats_nor_drags_the_incumbent(pose_type):
-    localizer = Localizer(MAP, None, LocalizerConfig(mode="coupled" if pose_type is AttractorPose else "kalman"))
+@pytest.mark.parametrize("belief_type", [AttractorBelief, KalmanBelief])
+def test_an_outlier_in_the_same_place_neither_unseats_nor_drags_the_incumbent(belief_type):
+    localizer = Localizer(MAP, None, LocalizerConfig(mode="coupled" if belief_type is AttractorBelief else "kalman"))
     observations, truth = drive(PICTURES, np.random.default_rng(5), 137.0, 100.0)
     for observation in observations:
         before = localizer.step(observation)
-    off = Injection(truth[-1] + [9.0, 0.0, 0.5], np.diag([1.0, 0.25, 0.01]))
-    localizer._margin = 5.0
-    localizer._reactivate(off)
+    off = PoseMeasurement(truth[-1] + [9.0, 0.0, 0.5], np.diag([1.0, 0.25, 0.01]))
+    localizer._take(off, replace(localizer._match, margin=5.0), weight=1.0)
     after = localizer._estimate(0.0)
     assert before.localized and after.localized
     assert np.linalg.norm(after.pose[:2] - before.pose[:2]) < 2.0
@@ -212,31 +210,31 @@ def test_needs_a_map_in_the_network_frame():
         Localizer(replace(MAP, frame="semi-metric"), None, LocalizerConfig())
 
 
-def injection_at(x, y, heading):
-    return Injection(np.array([x, y, heading]), np.diag([1.0, 0.25, 0.01]))
+def measured(x, y, heading):
+    return PoseMeasurement(np.array([x, y, heading]), np.diag([1.0, 0.25, 0.01]))
 
 
-@pytest.mark.parametrize("pose_type", [AttractorPose, KalmanPose])
-def test_injections_along_a_straight_teach_the_scale(pose_type):
-    belief = pose_type.uniform(np.zeros(2), np.log(2.0), LocalizerConfig()).challenge(injection_at(0.0, 0.0, 0.0)).adopt()
+@pytest.mark.parametrize("belief_type", [AttractorBelief, KalmanBelief])
+def test_measurements_along_a_straight_teach_the_scale(belief_type):
+    belief = belief_type.uniform(np.zeros(2), np.log(2.0), LocalizerConfig()).challenge(measured(0.0, 0.0, 0.0)).adopt()
     for k in range(1, 40):
         for _ in range(6):
             belief = belief.predict(Motion(0.4, 0.0, 0.1))  # 1 m each at the true 2.5 m per unit
-        belief = belief.inject(injection_at(6.0 * k, 0.0, 0.0))
+        belief = belief.inject(measured(6.0 * k, 0.0, 0.0))
     assert_allclose(belief.pose, [234.0, 0.0, 0.0], atol=0.15)
     assert np.exp(belief.log_scale) == pytest.approx(2.5, rel=0.01)
 
 
 def test_networks_and_filter_give_the_same_gaussian():
-    """Off the networks' limit E, injections with couplings and hand-back are a Kalman update, through turns as well."""
+    """Off the networks' limit E, injections with cross-covariances and hand-back are a Kalman update, through turns as well."""
     beliefs = []
-    for pose_type in (AttractorPose, KalmanPose):
-        belief = pose_type.uniform(np.zeros(2), 0.0, LocalizerConfig()).challenge(injection_at(0.0, 0.0, 0.0)).adopt()
+    for belief_type in (AttractorBelief, KalmanBelief):
+        belief = belief_type.uniform(np.zeros(2), 0.0, LocalizerConfig()).challenge(measured(0.0, 0.0, 0.0)).adopt()
         for k in range(1, 15):
             for _ in range(5):
                 belief = belief.predict(Motion(1.0, 0.02, 0.1))
             theta = 0.1 * k
-            belief = belief.inject(injection_at(50.0 * np.sin(theta) + 0.3, 50.0 * (1.0 - np.cos(theta)), theta))
+            belief = belief.inject(measured(50.0 * np.sin(theta) + 0.3, 50.0 * (1.0 - np.cos(theta)), theta))
         beliefs.append(belief)
     ours, yardstick = beliefs
     assert_allclose(ours.pose, yardstick.pose, atol=1e-3)
@@ -244,14 +242,14 @@ def test_networks_and_filter_give_the_same_gaussian():
     assert ours.log_scale == pytest.approx(yardstick.log_scale, abs=1e-4)
 
 
-@pytest.mark.parametrize("pose_type", [AttractorPose, KalmanPose])
-def test_a_challenger_moves_along_its_own_heading_and_snaps_when_adopted(pose_type):
-    belief = pose_type.uniform(np.zeros(2), 0.0, LocalizerConfig()).challenge(injection_at(0.0, 0.0, 0.0)).adopt()
-    belief = belief.challenge(injection_at(300.0, 40.0, np.pi / 2))
+@pytest.mark.parametrize("belief_type", [AttractorBelief, KalmanBelief])
+def test_a_challenger_moves_along_its_own_heading_and_snaps_when_adopted(belief_type):
+    belief = belief_type.uniform(np.zeros(2), 0.0, LocalizerConfig()).challenge(measured(0.0, 0.0, 0.0)).adopt()
+    belief = belief.challenge(measured(300.0, 40.0, np.pi / 2))
     for _ in range(10):
         belief = belief.predict(Motion(1.0, 0.0, 0.1))
     assert_allclose(belief.pose, [10.0, 0.0, 0.0], atol=0.1)
-    assert belief.sq_distance(injection_at(300.0, 50.0, np.pi / 2), challenger=True) < 1.0
+    assert belief.sq_distance(measured(300.0, 50.0, np.pi / 2), challenger=True) < 1.0
     assert_allclose(belief.adopt().pose, [300.0, 50.0, np.pi / 2], atol=0.1)
 
 

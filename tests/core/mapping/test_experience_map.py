@@ -1,4 +1,4 @@
-"""Edges carry scale-free sigmas and raw motions; RatSLAM's relaxation contracts errors; offsets are steadied along a stretch."""
+"""Edges carry scale-free sigmas and raw motions; RatSLAM's relaxation contracts errors; offsets are smoothed along a road."""
 
 import numpy as np
 import pytest
@@ -9,11 +9,11 @@ from hippodrome.core.mapping.experience_map import (
     Closure,
     ExperienceMapConfig,
     closure_edges,
-    joined,
+    concatenated,
     odometry_edges,
     relax_ratslam,
     relaxed_poses,
-    steadied,
+    with_median_offsets,
 )
 from hippodrome.core.types import EdgeKind
 
@@ -53,14 +53,14 @@ def test_standard_deviations_scale_with_the_unit_of_length():
 def test_no_closures_make_an_empty_set_of_edges():
     none = closure_edges([], CONFIG)
     assert none.motion.shape == none.sigma.shape == (0, 3)
-    assert len(joined(odometry_edges(np.zeros((1, 3)), CONFIG), none).source) == 0
+    assert len(concatenated(odometry_edges(np.zeros((1, 3)), CONFIG), none).source) == 0
 
 
 @pytest.mark.parametrize("relaxation", ["robust", "ratslam"])
 def test_closures_mend_a_biased_drive(relaxation):
     motions = square_motions(3, np.random.default_rng(1), turn_bias=0.01)
     config = ExperienceMapConfig(relaxation=relaxation, ratslam_sweeps=500)
-    edges = joined(odometry_edges(motions, config), closure_edges(closures_of(120, 40), config))
+    edges = concatenated(odometry_edges(motions, config), closure_edges(closures_of(120, 40), config))
     poses, reckoned = relaxed_poses(motions, edges, config), se2.integrate(np.zeros(3), motions)
 
     def gap(some):
@@ -90,17 +90,17 @@ def test_steadying_halves_the_noise_of_the_offsets_and_mends_an_outlier():
     noise = rng.normal(size=80)
     noise[40] = 8.0
     closures = [Closure(10 + i, 110 + i, (1.2 + float(e), 0.0, 0.1), 5.0, 3.0) for i, e in enumerate(noise)]
-    steady = np.array([c.motion[0] for c in steadied(closures, motions, CONFIG)])
+    steady = np.array([c.motion[0] for c in with_median_offsets(closures, motions, CONFIG)])
     assert np.std(steady - 1.2) < 0.6 * np.std(np.delete(noise, 40))
     assert abs(steady[40] - 1.2) < 1.5
-    assert all(c.motion[1:] == (0.0, 0.1) for c in steadied(closures, motions, CONFIG))
+    assert all(c.motion[1:] == (0.0, 0.1) for c in with_median_offsets(closures, motions, CONFIG))
 
 
 def test_steadying_keeps_stretches_apart():
     motions = np.tile([5.0, 0.0, 0.0], (200, 1))
     on_one_road = [Closure(10 + i, 110 + i, (0.5, 0.0, 0.0), 5.0, 3.0) for i in range(4)]
     on_another = [Closure(60 + i, 114 + i, (-2.0, 0.0, 0.0), 5.0, 3.0) for i in range(4)]
-    steady = steadied(on_another + on_one_road, motions, CONFIG)
+    steady = with_median_offsets(on_another + on_one_road, motions, CONFIG)
     assert_allclose([c.motion[0] for c in steady], [0.5] * 4 + [-2.0] * 4)
 
 

@@ -11,7 +11,7 @@ from hippodrome.core.mapping.mapper import (
     Mapper,
     MapperConfig,
     MappingError,
-    build_map,
+    map_drive,
 )
 from hippodrome.core.mapping.memory import PlaceMemoryConfig
 from hippodrome.core.types import EdgeKind, Observation
@@ -57,7 +57,7 @@ def drive():
 
 @pytest.fixture(scope="module")
 def ring_map(drive):
-    return build_map(drive[0], CONFIG)
+    return map_drive(drive[0], CONFIG)
 
 
 def closures_of(cognitive_map):
@@ -93,12 +93,12 @@ def test_a_recognised_visit_shares_the_view_cell_and_stays_a_vertex(ring_map):
 def test_frames_of_noise_close_no_loop():
     rng = np.random.default_rng(7)
     observations, _ = ring_drive(2.5, look=lambda _: rng.integers(0, 256, (120, 160), dtype=np.uint8))
-    source, _, _ = closures_of(build_map(observations, CONFIG))
+    source, _, _ = closures_of(map_drive(observations, CONFIG))
     assert len(source) == 0
 
 
 def test_an_unchanging_frame_closes_no_loop():
-    source, _, _ = closures_of(build_map(ring_drive(2.0, look=lambda _: PANORAMA[:, :160])[0], CONFIG))
+    source, _, _ = closures_of(map_drive(ring_drive(2.0, look=lambda _: PANORAMA[:, :160])[0], CONFIG))
     assert len(source) == 0
 
 
@@ -114,7 +114,7 @@ def test_visits_hold_the_raw_motion(ring_map, drive):
 
 
 def test_the_unit_of_length_changes_lengths_only(ring_map):
-    tripled = build_map(ring_drive(2.5, units_per_m=1.5)[0], CONFIG)
+    tripled = map_drive(ring_drive(2.5, units_per_m=1.5)[0], CONFIG)
     unit = np.array([3.0, 3.0, 1.0])
     assert_array_equal(tripled.view_cell, ring_map.view_cell)
     assert_array_equal(tripled.edges.source, ring_map.edges.source)
@@ -126,7 +126,7 @@ def test_the_unit_of_length_changes_lengths_only(ring_map):
 
 
 def test_the_same_drive_gives_the_same_map(ring_map, drive):
-    again = build_map(drive[0], CONFIG)
+    again = map_drive(drive[0], CONFIG)
     assert again.poses.tobytes() == ring_map.poses.tobytes()
     assert again.view_cells.templates.tobytes() == ring_map.view_cells.templates.tobytes()
     assert again.attractors.grid_mean_rad.tobytes() == ring_map.attractors.grid_mean_rad.tobytes()
@@ -158,7 +158,7 @@ def test_injections_hold_the_head_direction_that_drift_turns_away(ring_map):
 
 def test_frames_slower_than_odometry_are_waited_for(drive):
     sparse = [o if i % 3 == 0 else replace(o, frame=None) for i, o in enumerate(drive[0])]
-    cognitive_map = build_map(sparse, CONFIG)
+    cognitive_map = map_drive(sparse, CONFIG)
     with_frame = {o.t_s for o in sparse if o.frame is not None}
     assert set(cognitive_map.t_s.tolist()) <= with_frame
     assert len(closures_of(cognitive_map)[0]) > 20
@@ -167,7 +167,7 @@ def test_frames_slower_than_odometry_are_waited_for(drive):
 def test_ratslam_s_templates_and_relaxation_are_a_mode(drive):
     memory = PlaceMemoryConfig(view_cells=ViewCellConfig(kind="grey"))
     config = MapperConfig(memory=memory, experience_map=ExperienceMapConfig(relaxation="ratslam"))
-    cognitive_map = build_map(drive[0], config)
+    cognitive_map = map_drive(drive[0], config)
     assert cognitive_map.view_cells.kind == "grey"
     assert cognitive_map.view_cells.templates.dtype == np.uint8
     assert len(closures_of(cognitive_map)[0]) > 20
@@ -178,7 +178,15 @@ def test_a_drive_without_views_is_an_error():
         Mapper(CONFIG).finish()
 
 
+def test_the_constants_have_defaults(drive):
+    by_default, mapper = map_drive(drive[0][:400]), Mapper()
+    for observation in drive[0][:400]:
+        mapper.step(observation)
+    assert len(by_default.poses) > 10
+    assert mapper.finish().poses.tobytes() == by_default.poses.tobytes() == map_drive(drive[0][:400], CONFIG).poses.tobytes()
+
+
 def test_progress_hears_every_observation(drive):
     heard = []
-    build_map(drive[0][:50], CONFIG, heard.append)
+    map_drive(drive[0][:50], CONFIG, heard.append)
     assert heard == list(range(1, 51))

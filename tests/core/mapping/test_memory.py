@@ -2,14 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from hippodrome.core.mapping.memory import (
     PlaceMemory,
     PlaceMemoryConfig,
-    _parabola,
-    _peak_offset,
 )
 from hippodrome.core.views.descriptors import ViewCellConfig
 
@@ -33,24 +29,6 @@ def drive(memory, descriptors, first_vertex=0):
     for vertex, descriptor in enumerate(descriptors, start=first_vertex):
         found += memory.recognise(vertex, descriptor, SPACING, 0.0, SPACING)
     return found
-
-
-@given(st.floats(-2.0, 2.0), st.floats(0.01, 3.0), st.floats(-10.0, -4.1), st.floats(4.1, 10.0))
-def test_the_parabola_finds_the_peak_of_a_quadratic_on_an_uneven_grid(peak, curvature, before, after):
-    def value(x):
-        return 1.0 - curvature * (x - peak) ** 2
-
-    assert _parabola(before, value(before), value(0.0), after, value(after)) == pytest.approx(peak, abs=1e-6)
-
-
-def test_the_parabola_stays_with_its_cell():
-    assert _parabola(-5.0, 0.1, 0.5, 5.0, 0.9) == 0.0  # a straight line has no peak
-    assert _parabola(-5.0, 0.0, 0.6, 5.0, 0.9) == 2.5  # it would peak beyond half way to the next cell
-
-
-def test_a_shift_at_the_edge_is_taken_as_it_is():
-    assert _peak_offset(np.array([0.9, 0.5, 0.1], dtype=np.float32)) == -1.0
-    assert _peak_offset(np.array([0.5, 0.9, 0.5], dtype=np.float32)) == 0.0
 
 
 def test_a_second_pass_is_recognised_from_its_first_view_on():

@@ -1,15 +1,13 @@
 import numpy as np
 import pytest
 
-from hippodrome.core.refinement.covariance import calibrated, posterior
+from hippodrome.core.refinement.covariance import posterior_covariance, with_systematic_errors
 from hippodrome.core.refinement.noise import Noise
 from hippodrome.core.refinement.residuals import (
+    RoadTargets,
     State,
-    Targets,
-    closures,
+    all_factors,
     normal_equations,
-    odometry,
-    road,
 )
 from hippodrome.core.solvers.chain import factorise, marginals
 from hippodrome.core.types import EdgeKind, Edges, Visits
@@ -18,13 +16,13 @@ COUNT = 40
 
 
 @pytest.fixture
-def groups():
+def problem():
     """A straight drive on a road that is known lengthwise to metres; one closure, far surer than that."""
     poses = np.column_stack([5.0 * np.arange(COUNT), np.zeros((COUNT, 2))])
     motion = np.tile([5.0, 0.0, 0.0], (COUNT, 1))
     motion[0] = 0.0
     visits = Visits(np.arange(COUNT) * 0.5, np.arange(COUNT, dtype=np.int32), motion)
-    state, noise = State(poses, np.zeros(COUNT), np.zeros(2)), Noise(scale_tail=0.0)
+    state, noise = State(poses, np.zeros(COUNT), np.zeros(2)), Noise(scale_inverse_freedom=0.0)
     edges = Edges(
         np.array([30], np.int32),
         np.array([10], np.int32),
@@ -33,19 +31,13 @@ def groups():
         np.array([EdgeKind.CLOSURE], np.uint8),
         np.ones(1, np.float32),
     )
-    held = Targets(poses[:, :2], np.zeros(COUNT), np.zeros(COUNT), np.zeros(COUNT), np.ones(COUNT), 2.0)
-    return (
-        state,
-        odometry(state, visits, noise, np.zeros(COUNT - 1)),
-        road(state, held, noise),
-        closures(state, edges, noise),
-        edges,
-    )
+    held = RoadTargets(poses[:, :2], np.zeros(COUNT), np.zeros(COUNT), np.zeros(COUNT), np.ones(COUNT), 2.0)
+    return state, all_factors(state, visits, edges, held, noise, np.zeros(COUNT - 1)), edges
 
 
-def full_inverse(state, steps, roads, tied, edges):
+def full_inverse(state, factors, edges):
     """The covariance (S, 4, 4) from the whole matrix, gyro and the coupling through closures included."""
-    system = normal_equations(state, steps, roads, tied, edges)
+    system = normal_equations(state, factors, edges)
     size = 4 * COUNT
     matrix = np.zeros((size + 2, size + 2))
     for i in range(COUNT):
@@ -54,22 +46,22 @@ def full_inverse(state, steps, roads, tied, edges):
         if i + 1 < COUNT:
             matrix[4 * i : 4 * i + 4, 4 * i + 4 : 4 * i + 8] = system.upper[i]
     for e, (a, b) in enumerate(zip(edges.source, edges.target, strict=True)):
-        matrix[4 * b : 4 * b + 4, 4 * a : 4 * a + 4] += tied.there[e].T @ tied.here[e]
+        matrix[4 * b : 4 * b + 4, 4 * a : 4 * a + 4] += factors.closures.target[e].T @ factors.closures.source[e]
     matrix = np.triu(matrix) + np.triu(matrix, 1).T
     matrix[size:, size:] = system.corner
     inverse = np.linalg.inv(matrix)
     return np.stack([inverse[4 * i : 4 * i + 4, 4 * i : 4 * i + 4] for i in range(COUNT)])
 
 
-def test_the_far_end_of_a_closure_is_not_taken_as_known(groups):
-    state, steps, roads, tied, edges = groups
-    exact = full_inverse(state, steps, roads, tied, edges)[:, 0, 0]
-    ours = posterior(state, steps, roads, tied, edges)[:, 0, 0]
-    as_known = marginals(factorise(normal_equations(state, steps, roads, tied, edges)))[0][:, 0, 0]
+def test_the_far_end_of_a_closure_is_not_taken_known(problem):
+    state, factors, edges = problem
+    exact = full_inverse(state, factors, edges)[:, 0, 0]
+    ours = posterior_covariance(state, factors, edges)[:, 0, 0]
+    as_known = marginals(factorise(normal_equations(state, factors, edges)))[0][:, 0, 0]
     assert np.abs(ours / exact - 1.0).max() < 0.25
     assert (as_known / exact).min() < 0.1
 
 
 def test_what_never_averages_out_is_added_to_both_axes():
-    added = calibrated(np.zeros((2, 4, 4)), survey_sigma_m=0.5)
+    added = with_systematic_errors(np.zeros((2, 4, 4)), survey_sigma_m=0.5)
     np.testing.assert_allclose(added[1], np.diag([0.26, 0.26, 1e-4, 0.0]))

@@ -10,7 +10,7 @@ from hippodrome.core.matching.hmm.match import MatchedPath
 from hippodrome.core.refinement.paper import (
     PaperRefineConfig,
     metric_edges,
-    optimise,
+    minimise_topometric_cost,
     refine_paper,
     trusted_edges,
     without_closures,
@@ -122,7 +122,7 @@ def test_the_optimum_of_a_matched_map_is_a_fixed_point():
     poses, config = drive.cognitive_map.poses, PaperRefineConfig()
     edges = trusted_edges(drive.cognitive_map, config)
     matched = _matched_at(poses)
-    found, cost = optimise(poses, edges, matched, config)
+    found, cost = minimise_topometric_cost(poses, edges, matched, config)
     assert found == pytest.approx(poses, abs=1e-6)
     assert cost == pytest.approx(0.0, abs=1e-9)
 

@@ -14,7 +14,7 @@ def world():
     return network, semi_metric_drive(network, np.random.default_rng(2), length_m=1200.0, closures=20)
 
 
-def test_both_modes_answer_and_the_default_is_closer(world):
+def test_both_modes_answer_and_route_is_closer(world):
     network, drive = world
     start = StartPose(*drive.true_poses[0])
     ape = {}

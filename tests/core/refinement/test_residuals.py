@@ -8,13 +8,14 @@ from hippodrome.core.refinement.residuals import (
     BIAS_SIGMA_RADPS,
     GAIN_SIGMA,
     GEMAN_MCCLURE,
+    RoadTargets,
     State,
-    Targets,
-    closures,
-    moved,
+    all_factors,
+    closure_factors,
     normal_equations,
-    odometry,
-    road,
+    odometry_factors,
+    road_factors,
+    stepped,
 )
 from hippodrome.core.refinement.solver import gauss_newton_step
 from hippodrome.core.types import EdgeKind, Edges, Visits
@@ -40,26 +41,26 @@ def problem():
         source, target, seen, np.tile([0.5, 0.25, 0.08], (3, 1)), np.full(3, EdgeKind.CLOSURE, np.uint8), np.ones(3, np.float32)
     )
     points = truth[:, :2] + 0.1 * rng.standard_normal((COUNT, 2))
-    targets = Targets(points, truth[:, 2], np.full(COUNT, 0.02), np.full(COUNT, 0.1), np.ones(COUNT), 3.0)
+    targets = RoadTargets(points, truth[:, 2], np.full(COUNT, 0.02), np.full(COUNT, 0.1), np.ones(COUNT), 3.0)
     start = State(truth + 0.1 * rng.standard_normal((COUNT, 3)) * [1.0, 1.0, 0.1], np.full(COUNT, 0.6), np.zeros(2))
     return visits, edges, targets, start
 
 
-def numeric(group_of, state, visit):
-    """Derivative (N, M, 4) of a group's residuals by one visit's unknowns."""
+def numeric(factors_of, state, visit):
+    """Derivative (N, M, 4) of the factors' residuals by one keyframe's unknowns."""
     columns = []
     for axis in range(4):
         step = np.zeros((COUNT, 4))
         step[visit, axis] = 1e-6
-        high, low = (group_of(moved(state, sign * step, np.zeros(2))).residual for sign in (1.0, -1.0))
+        high, low = (factors_of(stepped(state, sign * step, np.zeros(2))).residual for sign in (1.0, -1.0))
         columns.append((high - low) / 2e-6)
     return np.stack(columns, axis=-1)
 
 
 def test_only_the_scale_may_jump(problem):
     visits, _, _, state = problem
-    state = moved(state, np.outer(np.arange(COUNT) % 7 == 0, [0.0, 0.0, 0.0, 0.05]), np.zeros(2))
-    normal, heavy = (odometry(state, visits, Noise(scale_tail=tail), NOTHING_OPEN) for tail in (0.0, 0.25))
+    state = stepped(state, np.outer(np.arange(COUNT) % 7 == 0, [0.0, 0.0, 0.0, 0.05]), np.zeros(2))
+    normal, heavy = (odometry_factors(state, visits, Noise(scale_inverse_freedom=tail), NOTHING_OPEN) for tail in (0.0, 0.25))
     expected = 1.25 / (1.0 + 0.25 * normal.residual[:, 3] ** 2)
     assert expected.min() < 0.5
     np.testing.assert_allclose(heavy.weight, np.column_stack([np.ones((COUNT - 1, 3)), expected]))
@@ -70,43 +71,44 @@ def test_a_step_that_nothing_tells_has_the_weight_of_a_usual_one(problem):
     visits, _, _, state = problem
     noise = Noise()
     metres = np.hypot(*visits.motion[1:, :2].T) * np.exp(state.log_scale[:-1])
-    steps = odometry(state, visits, noise, noise.step_sigmas(metres)[:, 3] ** 2)  # as open as before any data, residual 0
+    steps = odometry_factors(state, visits, noise, noise.step_sigmas(metres)[:, 3] ** 2)  # as open as before any data, residual 0
     np.testing.assert_allclose(steps.weight[:, 3], 1.0)
 
 
 def test_a_turn_drawn_otherwise_than_driven_loses_weight(problem):
     _, _, targets, state = problem
-    normal, heavy = (road(state, targets, Noise(road_tail=tail)) for tail in (0.0, 1.0))
+    normal, heavy = (road_factors(state, targets, Noise(road_inverse_freedom=tail)) for tail in (0.0, 1.0))
     np.testing.assert_allclose(heavy.weight, 2.0 / (1.0 + normal.residual**2) * [1.0, 1.0, 0.0] + [0.0, 0.0, 1.0])
 
 
 def test_jacobians_agree_with_differences(problem):
     visits, edges, targets, state = problem
-    quiet = Noise(lateral_m=50.0, lane_heading_rad=50.0, closure_factor=1e3, scale_tail=0.0)  # robust weights then hardly change
-    steps, roads, tied = odometry(state, visits, quiet, NOTHING_OPEN), road(state, targets, quiet), closures(state, edges, quiet)
+    # sigmas so wide that the robust weights hardly change
+    quiet = Noise(lateral_m=50.0, lane_heading_rad=50.0, closure_factor=1e3, scale_inverse_freedom=0.0)
+    steps, roads, closing = all_factors(state, visits, edges, targets, quiet, NOTHING_OPEN)
     for visit in (0, 7, 20):
-        by_steps = numeric(lambda s: odometry(s, visits, quiet, NOTHING_OPEN), state, visit)
-        np.testing.assert_allclose(by_steps[visit, :, :3], steps.here[visit, :, :3], atol=1e-4)
+        by_steps = numeric(lambda s: odometry_factors(s, visits, quiet, NOTHING_OPEN), state, visit)
+        np.testing.assert_allclose(by_steps[visit, :, :3], steps.source[visit, :, :3], atol=1e-4)
         if visit:
-            np.testing.assert_allclose(by_steps[visit - 1], steps.there[visit - 1], atol=1e-4)
-        by_road = numeric(lambda s: road(s, targets, quiet), state, visit)
-        np.testing.assert_allclose(by_road[visit], roads.here[visit], atol=1e-6)
-    by_closure = numeric(lambda s: closures(s, edges, quiet), state, 20)
-    np.testing.assert_allclose(by_closure[0, :, :3], tied.here[0, :, :3], atol=1e-4)
+            np.testing.assert_allclose(by_steps[visit - 1], steps.target[visit - 1], atol=1e-4)
+        by_road = numeric(lambda s: road_factors(s, targets, quiet), state, visit)
+        np.testing.assert_allclose(by_road[visit], roads.jacobian[visit], atol=1e-6)
+    by_closure = numeric(lambda s: closure_factors(s, edges, quiet), state, 20)
+    np.testing.assert_allclose(by_closure[0, :, :3], closing.source[0, :, :3], atol=1e-4)
 
 
 def test_gyro_jacobian_agrees_with_differences(problem):
     visits, _, _, state = problem
-    step = 1e-6
+    step, noise = 1e-6, Noise(scale_inverse_freedom=0.0)
     for column in range(2):
         gyro = np.eye(2)[column] * step
         high, low = (
-            odometry(moved(state, np.zeros((COUNT, 4)), sign * gyro), visits, Noise(scale_tail=0.0), NOTHING_OPEN).residual
+            odometry_factors(stepped(state, np.zeros((COUNT, 4)), sign * gyro), visits, noise, NOTHING_OPEN).residual
             for sign in (1.0, -1.0)
         )
         np.testing.assert_allclose(
             (high - low) / (2 * step),
-            odometry(state, visits, Noise(scale_tail=0.0), NOTHING_OPEN).border[:, :, column],
+            odometry_factors(state, visits, noise, NOTHING_OPEN).gyro[:, :, column],
             atol=1e-4,
         )
 
@@ -149,19 +151,19 @@ def _gtsam_optimum(visits, edges, targets, state, noise, scale):
 
     def scale_error(i):
         sigma = noise.log_scale * np.sqrt(max(scale[i] * lengths[i], 0.1))
-        return lambda a, b: np.array([b[3] - a[3]]) / sigma * np.sqrt(1.0 + noise.scale_tail)
+        return lambda a, b: np.array([b[3] - a[3]]) / sigma * np.sqrt(1.0 + noise.scale_inverse_freedom)
 
     def road_error(i, component):
         tangent = np.array([np.cos(targets.heading_rad[i]), np.sin(targets.heading_rad[i])])
-        lateral = np.sqrt(noise.lateral_m**2 + targets.freedom_m[i] ** 2 + (2.0 * targets.curvature_1pm[i]) ** 2)
+        lateral = np.sqrt(noise.lateral_m**2 + targets.added_lateral_m[i] ** 2 + (2.0 * targets.curvature_1pm[i]) ** 2)
         heading = np.hypot(noise.lane_heading_rad, targets.curvature_1pm[i])
 
         def error(a):
             off = a[:2] - targets.points_m[i]
             if component == 0:
-                return np.array([tangent[0] * off[1] - tangent[1] * off[0]]) / lateral * np.sqrt(1.0 + noise.road_tail)
+                return np.array([tangent[0] * off[1] - tangent[1] * off[0]]) / lateral * np.sqrt(1.0 + noise.road_inverse_freedom)
             if component == 1:
-                return np.array([a[2] - targets.heading_rad[i]]) / heading * np.sqrt(1.0 + noise.road_tail)
+                return np.array([a[2] - targets.heading_rad[i]]) / heading * np.sqrt(1.0 + noise.road_inverse_freedom)
             return np.array([tangent @ off]) / targets.along_sigma_m
 
         return error
@@ -198,10 +200,10 @@ def _gtsam_optimum(visits, edges, targets, state, noise, scale):
 
     for i in range(COUNT - 1):
         add([i, i + 1, gyro], step_error(i), 3)
-        add([i, i + 1], scale_error(i), 1, student(noise.scale_tail))
+        add([i, i + 1], scale_error(i), 1, student(noise.scale_inverse_freedom))
     for i in range(COUNT):
         for component in range(3):
-            add([i], road_error(i, component), 1, student(noise.road_tail) if component < 2 else None)
+            add([i], road_error(i, component), 1, student(noise.road_inverse_freedom) if component < 2 else None)
     for e in range(len(edges.source)):
         add(
             [int(edges.source[e]), int(edges.target[e])],
@@ -224,7 +226,5 @@ def test_the_gradient_vanishes_at_the_optimum(problem):
     noise = Noise()
     for _ in range(60):
         state, _ = gauss_newton_step(state, visits, edges, targets, noise, NOTHING_OPEN, tolerance=1e-10)
-    system = normal_equations(
-        state, odometry(state, visits, noise, NOTHING_OPEN), road(state, targets, noise), closures(state, edges, noise), edges
-    )
+    system = normal_equations(state, all_factors(state, visits, edges, targets, noise, NOTHING_OPEN), edges)
     assert np.abs(system.rhs).max() < 1e-2 * np.sqrt(np.diagonal(system.diagonal, axis1=1, axis2=2)).max()

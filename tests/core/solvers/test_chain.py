@@ -74,3 +74,16 @@ def test_distant_couplings_are_solved_to_the_tolerance(system):
     expected = np.linalg.solve(dense_of(system) + extra, flat(system.rhs, system.rhs_border))
     x, border, _ = solve_coupled(system, couple, 1e-10, 100)
     np.testing.assert_allclose(flat(x, border), expected, rtol=1e-7, atol=1e-12)
+
+
+def test_the_recursions_by_hand():
+    """T = [[2, 1], [1, 2]], its border not coupled: pivots 2 and 2 - 1 / 2, gain 1 / 2, inverse [[2, -1], [-1, 2]] / 3."""
+    blocks = np.full((2, 1, 1), 2.0), np.ones((1, 1, 1))
+    system = ChainSystem(*blocks, np.zeros((2, 1, 1)), np.ones((1, 1)), np.array([[3.0], [0.0]]), np.array([5.0]))
+    factor = factorise(system)
+    assert factor.inverse_pivot.ravel() == pytest.approx([1.0 / 2.0, 1.0 / 1.5])
+    assert factor.gain.ravel() == pytest.approx([0.5])
+    assert flat(*solve(factor, system.rhs, system.rhs_border)) == pytest.approx([2.0, -1.0, 5.0])
+    own, next_ = marginals(factor)
+    assert own.ravel() == pytest.approx([2.0 / 3.0, 2.0 / 3.0])
+    assert next_.ravel() == pytest.approx([-1.0 / 3.0])

@@ -38,7 +38,6 @@ def test_a_line_through_points_in_one_step():
     solution = gauss_newton(lambda state: (jacobian @ state - y, jacobian), np.zeros(2))
     assert solution.state == pytest.approx([2.0, 1.0])
     assert solution.converged
-    assert solution.information.toarray() == pytest.approx(np.array([[5.0, 3.0], [3.0, 3.0]]))
 
 
 def test_a_step_that_overshoots_is_halved():

@@ -8,6 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hippodrome.core.views.graph import (
     CellGraph,
+    Paths,
+    Predecessors,
     graph_of,
     neighbourhood,
     walk_back,
@@ -16,9 +18,11 @@ from hippodrome.core.views.sequence import (
     NO_EVIDENCE,
     Evidence,
     SequenceConfig,
+    Step,
     filter_step,
     margin_over,
     peak,
+    propagate,
     standardise,
 )
 
@@ -76,6 +80,31 @@ def test_evidence_crosses_a_loop_closure():
 def test_cells_stored_since_the_last_view_bring_no_evidence():
     after = step(evidence([1.0]), z(1.0, 1.0, 1.0), chain(3))
     assert_allclose(after.filtered, [0.5, 1.0, 0.5])
+
+
+def test_evidence_runs_along_paths_that_were_laid_out():
+    paths = Paths(np.array([0, 0, 1], np.int32), np.array([0.0, 5.0, 0.0]), np.zeros(3))
+    predecessors, tolerance = Predecessors(np.array([0, 1, 3], np.int32), paths), Step(3.0, 0.5)
+    before, scores, cells = z(2.0, 0.0), z(0.5, 1.0), np.arange(2, dtype=np.int32)
+    moved = propagate(before, cells, scores, predecessors, Step(5.0, 0.0), tolerance, np.float32(0.5))
+    assert_allclose(moved, [0.25, 1.5])
+    turned = propagate(before, cells, scores, predecessors, Step(5.0, 1.0), tolerance, np.float32(0.5))
+    assert_allclose(turned, [0.25, 0.5])
+    second = propagate(before, cells[1:], scores[1:], predecessors, Step(5.0, 0.0), tolerance, np.float32(0.5))
+    assert_allclose(second, [0.0, 1.5])
+
+
+def test_the_graph_that_grows_and_the_paths_that_were_laid_out_give_the_same_evidence():
+    rng, count = np.random.default_rng(1), 60
+    graph = graph_of(rng.integers(0, count, 400), rng.uniform(3.0, 7.0, 400), rng.normal(0.0, 0.4, 400), 3.0)
+    before, scores = rng.normal(size=(2, graph.cell_count)).astype(np.float32)
+    walks = [walk_back(graph.links, cell, 5.0 + 0.6 * 5.0) for cell in range(graph.cell_count)]
+    start = np.cumsum([0, *(len(walk.source) for walk in walks)]).astype(np.int32)
+    paths = Paths(*(np.concatenate(parts) for parts in zip(*walks, strict=True)))
+    driven, tolerance = Step(5.0, 0.1), Step(CONFIG.length_tolerance * 5.0, CONFIG.turn_tolerance_rad)
+    cells = np.arange(graph.cell_count, dtype=np.int32)
+    laid_out = propagate(before, cells, scores, Predecessors(start, paths), driven, tolerance, np.float32(CONFIG.memory))
+    assert_array_equal(step(evidence(before), scores, graph, turned_rad=0.1).filtered, laid_out)
 
 
 def test_a_handful_of_cells_makes_no_statistics():

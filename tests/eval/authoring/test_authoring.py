@@ -12,12 +12,14 @@ import yaml
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.check import check_scenario
 from hippodrome.eval.authoring.draft import LOCALIZATION_M, TOUR_M, new_scenario
-from hippodrome.eval.authoring.keys import noise_keys, scenario_keys
+from hippodrome.eval.authoring.keys import comments, fields_of, models, noise_keys, scenario_keys
+from hippodrome.eval.authoring.meanings import MEANINGS
 from hippodrome.eval.authoring.preview import visits_of_road
 from hippodrome.eval.authoring.reference import reference_markdown, with_tables
 from hippodrome.eval.authoring.schema import scenario_schema
 from hippodrome.eval.cli import main
 from hippodrome.sim.scenario import Scenario, load_scenario
+from hippodrome.sim.self_motion import SelfMotionNoise
 from hippodrome.sim.town import build_town
 
 ROOT = Path(__file__).parents[3]
@@ -139,6 +141,14 @@ def test_visits_count_entries_not_samples(tmp_path):
 
 def test_every_key_has_a_meaning():
     assert [key.name for key in (*scenario_keys(), *noise_keys()) if not key.meaning] == []
+
+
+def test_every_meaning_is_of_a_key_that_exists_and_has_no_comment():
+    """A comment beside the declaration goes first, so a second meaning would never be shown: remove it from ``MEANINGS``."""
+    kinds = (*models(Scenario), *models(SelfMotionNoise))
+    fields = {f"{model.__name__}.{name}": comments(model)[name] for model in kinds for name, _, _ in fields_of(model)}
+    assert set(MEANINGS) - set(fields) == set()
+    assert {name for name in MEANINGS if fields[name]} == set()
 
 
 def test_keys_are_those_of_the_model():

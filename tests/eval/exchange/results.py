@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from hippodrome._files import sha256_of
 from hippodrome.core import se2
 from hippodrome.core.types import Trajectory
 from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.proto.codec import save_map
 from hippodrome.sim.episode import Samples
-from hippodrome.sim.files import sha256_of
 from hippodrome.sim.recording import Recording, chunk_path, seal, write_arrays, write_chunk
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.town import TownSpec, build_town

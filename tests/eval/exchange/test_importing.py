@@ -14,16 +14,12 @@ from hippodrome.core import se2
 from hippodrome.core.types import Trajectory
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
-from hippodrome.eval.exchange.drives.exported import ExchangeError, truth_of
-from hippodrome.eval.exchange.drives.foreign import (
-    ForeignFrame,
-    Motion,
-    decode,
-    motion_of,
-    truth_at,
-)
-from hippodrome.eval.exchange.importing import _samples
-from hippodrome.eval.exchange.readers.raw_image import png_of
+from hippodrome.eval.exchange.drives.errors import ExchangeError
+from hippodrome.eval.exchange.drives.exported import truth_of
+from hippodrome.eval.exchange.drives.foreign import ForeignFrame, Motion, motion_of, truth_at
+from hippodrome.eval.exchange.drives.images import decode
+from hippodrome.eval.exchange.drives.steps import steps_of
+from hippodrome.eval.exchange.readers.messages import png_of
 from hippodrome.eval.exchange.readers.spool import Spool
 from hippodrome.eval.files.trajectories import read_tum, write_tum
 from hippodrome.sim.recording import open_recording
@@ -92,7 +88,7 @@ def test_frames_at_any_time_leave_distance_and_turn_as_they_were(seed, rate_hz):
     motion, _ = smooth_drive(seed)
     t_s = np.arange(0.05, 20.0, 1.0 / rate_hz)
     frames = [type("F", (), {"t_s": float(t)}) for t in t_s]
-    samples = _samples(frames, motion, None)
+    samples = steps_of(frames, motion, None)
     assert np.allclose(samples.t_s[samples.frame_steps], t_s, atol=1e-4)
     assert (samples.dt_s > 0.0).all()
     assert (samples.dt_s * samples.speed).sum() == pytest.approx(0.1 * motion.speed.sum())

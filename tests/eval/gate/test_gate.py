@@ -13,7 +13,7 @@ from hippodrome.eval.cli import main
 from hippodrome.eval.gate import run as gate_run
 from hippodrome.eval.gate.baseline import (
     Baseline,
-    Cell,
+    BaselineRow,
     Figure,
     GateError,
     baseline_of,
@@ -49,7 +49,7 @@ def cells(change=lambda scenario, seed, method, name, value: value, towns=TOWNS,
             figures[name] = Figure(value=change(scenario, seed, method, name, value), definition=name)
         whole = {"scenario": scenario, "seed": seed, "question": "q", "method": method, "failed": False, "localized": True,
                  "figures": figures, **fields}  # fmt: skip
-        found.append(Cell(**whole))
+        found.append(BaselineRow(**whole))
     return Baseline(cells=tuple(found))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hippodrome.eval.commands.gate import SEEDS
-from hippodrome.eval.gate.baseline import Baseline, Cell, Figure, read_baseline
+from hippodrome.eval.gate.baseline import Baseline, BaselineRow, Figure, read_baseline
 from hippodrome.eval.gate.compare import ALPHA, REPEATABILITY, compare
 
 SAMPLES = json.loads((Path(__file__).parent / "gate_samples.json").read_text(encoding="utf-8"))
@@ -22,7 +22,7 @@ APE, BUILDS = "APE mean (m)", 20
 
 def cell(scenario, seed, method, figures):
     named = {name: Figure(value=value, definition=name) for name, value in figures.items()}
-    return Cell(scenario=scenario, seed=seed, question="q", method=method, failed=False, localized=None, figures=named)
+    return BaselineRow(scenario=scenario, seed=seed, question="q", method=method, failed=False, localized=None, figures=named)
 
 
 def repeated(numbers, ape_factor=1.0):

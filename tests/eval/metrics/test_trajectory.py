@@ -12,7 +12,6 @@ from hippodrome.core.types import Trajectory
 from hippodrome.eval.metrics.trajectory import (
     MetricError,
     ape,
-    compare,
     path_length_m,
     pool,
     rpe,
@@ -143,19 +142,10 @@ def test_definitions_name_alignment_delta_unit_and_pairing():
     assert len({rpe(line(), line(), 4.0, pairing=how).definition for how in ("all", "chained")}) == 2
 
 
-def test_scores_of_different_definitions_refuse_comparison_and_pooling():
+def test_scores_of_different_definitions_refuse_pooling():
     free, aligned = ape(line(side_m=1.0), line()), ape(line(side_m=1.0), line(), "start")
-    for action in (lambda: compare(free, aligned), lambda: pool([free, aligned])):
-        with pytest.raises(MetricError, match=r"different definitions cannot be compared: 'APE.*none.*' and 'APE.*start"):
-            action()
-
-
-def test_compare_by_hand():
-    comparison = compare(ape(line(side_m=1.0), line()), ape(line(side_m=4.0), line()))
-    assert (comparison.mean_change_m, comparison.mean_ratio) == (-3.0, 0.25)
-    perfect = ape(line(), line())
-    assert compare(perfect, perfect).mean_ratio == 1.0
-    assert compare(ape(line(side_m=1.0), line()), perfect).mean_ratio == float("inf")
+    with pytest.raises(MetricError, match=r"different definitions cannot be compared: 'APE.*none.*' and 'APE.*start"):
+        pool([free, aligned])
 
 
 def test_pooling_weighs_samples_not_runs():

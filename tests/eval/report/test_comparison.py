@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from hippodrome.eval.methods.method import ORBSLAM3_FINAL, ORBSLAM3_LIVE
 from hippodrome.eval.report.report import report_html
 from hippodrome.eval.results.fairness import GIVEN, fairness_rows
 from hippodrome.eval.results.model import (
@@ -13,10 +14,10 @@ from hippodrome.eval.results.model import (
     Row,
     ScenarioResult,
 )
-from hippodrome.eval.rivals.orbslam3.rows import FINAL, LIVE
-from hippodrome.eval.rivals.sequences import SequenceRow, write_table_two
+from hippodrome.eval.results.table_two import SequenceRow, write_table_two
 
-ROWS = (Row(method="topometric", cpu_percent=0.5), Row(method=LIVE, failure="hung"), Row(method=FINAL, failure="hung"))
+TRACKED = (Row(method=method.label, failure="hung") for method in (ORBSLAM3_LIVE, ORBSLAM3_FINAL))
+ROWS = (Row(method="topometric", cpu_percent=0.5), *TRACKED)
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ import pytest
 from hippodrome.core import se2
 from hippodrome.core.types import Trajectory
 from hippodrome.eval.methods.materials import score_trajectory
+from hippodrome.eval.methods.method import SEMI_METRIC, TOPOMETRIC
 from hippodrome.eval.report.evidence import (
     APART,
     EVEN_FRAMES,
@@ -50,12 +51,12 @@ def made(tmp_path):
     own = camera.poses[vertices].copy()  # the same path, but in a frame of its own, turned and moved
     own = se2.compose(se2.inverse(own[0]), own)
     scored = {
-        "semi-metric": score_trajectory(Trajectory(camera.t_s[vertices], own), truth, metric=False),
-        "topometric": score_trajectory(Trajectory(camera.t_s[vertices], off), truth, metric=True),
+        SEMI_METRIC: score_trajectory(Trajectory(camera.t_s[vertices], own), truth, SEMI_METRIC.alignment),
+        TOPOMETRIC: score_trajectory(Trajectory(camera.t_s[vertices], off), truth, TOPOMETRIC.alignment),
     }
     estimates = [SimpleNamespace(t_s=float(t), pose=pose) for t, pose in zip(camera.t_s, camera.poses, strict=True)]
     localized = SimpleNamespace(t_s=camera.t_s, errors_m=np.zeros(FRAMES), localized=camera.t_s > 10.0)
-    found = {"topometric": SimpleNamespace(localized=localized, localization=SimpleNamespace(estimates=estimates))}
+    found = {TOPOMETRIC: SimpleNamespace(localized=localized, localization=SimpleNamespace(estimates=estimates))}
     far = np.array([[5000.0, 5000.0], [5100.0, 5000.0]])
     lanes = (np.array([[150.0, 100.0], [200.0, 100.0], [250.0, 100.0]]), far)
     roads = SimpleNamespace(lane_count=2, lane_points_m=lambda lane: lanes[lane])

@@ -2,12 +2,14 @@
 
 import pytest
 
+from hippodrome.eval.methods.method import ORBSLAM3, ORBSLAM3_FINAL, REFINED
 from hippodrome.eval.results.model import ErrorSummary, LocalizationSummary, Row
-from hippodrome.eval.results.ratios import OURS, ratio_lines, ratios
+from hippodrome.eval.results.ratios import ratio_lines, ratios
+from hippodrome.eval.results.table_two import SequenceRow
 from hippodrome.eval.results.tables import MAPPING_COLUMNS, row_cells
-from hippodrome.eval.rivals.orbslam3.relocalize import METHOD
-from hippodrome.eval.rivals.orbslam3.rows import FINAL
-from hippodrome.eval.rivals.sequences import SequenceRow
+
+FINAL, METHOD = ORBSLAM3_FINAL.label, ORBSLAM3.label
+OURS = [method.label for method in REFINED]
 
 
 def theirs(mean_m=0.3, tracked_share=1.0, **fields):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hippodrome.core.types import Observation, Trajectory
+from hippodrome.eval.methods.method import NO_ATTRACTOR, RATSLAM, SEMI_METRIC, TOPOMETRIC, TOPOMETRIC_PAPER
 from hippodrome.eval.rivals import memory
 from hippodrome.eval.rivals.memory import MemoryTask, peak_rss_bytes
 from hippodrome.sim.scenario import Scenario
@@ -32,18 +33,18 @@ def peak(method):
 
 def test_a_method_s_process_holds_the_method_and_not_us():
     own = 1024 * int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0])
-    assert 50 << 20 < peak("semi-metric, no attractor") < own
+    assert 50 << 20 < peak(NO_ATTRACTOR) < own
 
 
 def test_a_method_that_failed_has_no_figure():
-    assert peak("topometric (paper)") is None
+    assert peak(TOPOMETRIC_PAPER) is None
 
 
 def test_each_method_has_a_job_of_its_own():
     materials = memory.gather(None, None)
-    jobs = {name: memory._job(name, materials) for name in ("semi-metric", "RatSLAM", "topometric (paper)", "topometric")}
+    jobs = {method: memory._job(method, materials) for method in (SEMI_METRIC, RATSLAM, TOPOMETRIC_PAPER, TOPOMETRIC)}
     assert [job.kind for job in jobs.values()] == ["mapper", "RatSLAM", "mapper", "mapper"]
-    assert jobs["semi-metric"].refine is None
-    assert jobs["topometric (paper)"].refine[1].mode == "paper"
-    assert jobs["topometric (paper)"].refine[2].x_m == 1.0
-    assert (jobs["topometric"].refine[1].mode, jobs["topometric"].refine[2]) == ("route", None)
+    assert jobs[SEMI_METRIC].refine is None
+    assert jobs[TOPOMETRIC_PAPER].refine[1].mode == "paper"
+    assert jobs[TOPOMETRIC_PAPER].refine[2].x_m == 1.0
+    assert (jobs[TOPOMETRIC].refine[1].mode, jobs[TOPOMETRIC].refine[2]) == ("route", None)

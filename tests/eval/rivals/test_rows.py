@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from hippodrome.core.mapping.mapper import MapperConfig, build_map
+from hippodrome.core.mapping.mapper import MapperConfig, map_drive
 from hippodrome.core.types import HippodromeError, Observation
 from hippodrome.eval.rivals.orbslam3.stage import stereo_scenario
 from hippodrome.eval.rivals.rows import (
@@ -33,7 +33,7 @@ def circling(laps, views=150):
 
 def test_the_map_without_attractors_has_the_same_vertices_edges_and_poses():
     drive = circling(2)
-    whole = build_map(drive, MapperConfig())
+    whole = map_drive(drive, MapperConfig())
     without, cpu_s = map_without_attractor(drive, MapperConfig())
     assert cpu_s > 0.0
     assert_array_equal(without.poses, whole.poses)
@@ -45,7 +45,7 @@ def test_the_map_without_attractors_has_the_same_vertices_edges_and_poses():
 
 def test_the_map_without_attractors_is_a_smaller_file_that_loads(tmp_path):
     drive = circling(2)
-    whole = save_map(tmp_path / "whole.pbstream", build_map(drive, MapperConfig()), {})
+    whole = save_map(tmp_path / "whole.pbstream", map_drive(drive, MapperConfig()), {})
     without, _ = map_without_attractor(drive, MapperConfig())
     assert save_map(tmp_path / "without.pbstream", without, {}) < whole
     assert_array_equal(load_map(tmp_path / "without.pbstream")[0].poses, without.poses)

@@ -74,6 +74,6 @@ def test_an_edited_scenario_and_other_code_are_run_anew(ran, scenario, tmp_path,
     assert len(cells) == 1
     scenario.write_text("name: tiny\ncamera: {rate_hz: 5}\n")
     assert run.sweep([scenario], [1], [], 1, None, tmp_path / "out")
-    monkeypatch.setattr("hippodrome.eval.sweep.grid.code_sha256", lambda: "other")
+    monkeypatch.setattr("hippodrome.eval.sweep.grid.cell_code_sha256", lambda: "other")
     assert run.sweep([scenario], [1], [], 1, None, tmp_path / "out")
     assert len(cells) == 3

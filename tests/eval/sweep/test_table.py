@@ -11,13 +11,13 @@ from hippodrome.eval.results.model import (
     ScenarioResult,
 )
 from hippodrome.eval.sweep.cell import CellResult, Samples
-from hippodrome.eval.sweep.grid import Cell
+from hippodrome.eval.sweep.grid import SweepCell
 from hippodrome.eval.sweep.table import pooled_rows, sweep_markdown
 from hippodrome.sim.scenario import Scenario
 
 
 def finished(seed, errors_m, failure=None, noise="paper"):
-    cell = Cell(Scenario(name="town", seed=seed, noise=noise), (("noise", f'"{noise}"'),))
+    cell = SweepCell(Scenario(name="town", seed=seed, noise=noise), (("noise", f'"{noise}"'),))
     mean_m = None if failure else ErrorSummary(definition="APE", mean_m=float(np.mean(errors_m)))
     located = LocalizationSummary(definition="localization", success=failure is None, false_fixes=seed)
     rows = (Row(method="ours", failure=failure, ape=mean_m, localization=located),)

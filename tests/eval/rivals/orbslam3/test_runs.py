@@ -15,26 +15,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 from hippodrome.core import se2
 from hippodrome.core.types import HippodromeError, Trajectory
 from hippodrome.eval.files.trajectories import read_tum
+from hippodrome.eval.methods.method import ORBSLAM3, ORBSLAM3_FINAL, ORBSLAM3_LIVE
 from hippodrome.eval.pool import worker_pool
+from hippodrome.eval.results.table_two import SequenceRow
 from hippodrome.eval.results.tables import failed_runs
 from hippodrome.eval.rivals.orbslam3 import environment, pairs, stage, tracker
 from hippodrome.eval.rivals.orbslam3.environment import NotInstalled, ensure_environment
 from hippodrome.eval.rivals.orbslam3.pairs import StereoDrive
 from hippodrome.eval.rivals.orbslam3.poses import body_poses, read_camera_tum, thinned
-from hippodrome.eval.rivals.orbslam3.relocalize import (
-    METHOD,
-    map_alignment,
-    score_sequence,
-    sequence_task,
-)
-from hippodrome.eval.rivals.orbslam3.rows import (
-    FINAL,
-    LIVE,
-    failed_rows,
-    rows,
-)
+from hippodrome.eval.rivals.orbslam3.relocalize import map_alignment, score_sequence, sequence_task
+from hippodrome.eval.rivals.orbslam3.rows import failed_rows, rows
 from hippodrome.eval.rivals.orbslam3.tracker import CRASH, RunTask, run_tracker
-from hippodrome.eval.rivals.sequences import SequenceRow
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scenario import load_scenario
@@ -99,7 +90,7 @@ def test_a_good_run_becomes_two_rows(monkeypatch, tmp_path):
     assert done.failure is None
     assert_array_equal(json.loads((tmp_path / "run" / "brightness.json").read_text()), [[n, n + 100] for n in range(FRAMES)])
     live, final = rows([done, done, done], DRIVE)
-    assert (live.method, final.method) == (LIVE, FINAL)
+    assert (live.method, final.method) == (ORBSLAM3_LIVE.label, ORBSLAM3_FINAL.label)
     assert live.failure is None
     assert live.cpu_percent == pytest.approx(100 * 1.0 / 4.0)
     assert (live.camera_frames, live.keyframes, live.map_bytes) == (FRAMES, FRAMES, 5_000_000)
@@ -168,7 +159,7 @@ def test_a_sequence_is_scored_where_the_saved_map_lies(monkeypatch, tmp_path):
     found = run(monkeypatch, tmp_path / "sequence", loaded=mapped.folder)
     assert (tmp_path / "sequence" / "run" / "atlas.osa").is_symlink()
     assert "LoadAtlasFromFile" in (tmp_path / "sequence" / "run" / "settings.yaml").read_text()
-    row = SequenceRow(method=METHOD, number=3, length_m=39.0)
+    row = SequenceRow(method=ORBSLAM3.label, number=3, length_m=39.0)
     task = RunTask(Path(), Path(), DRIVE, found.folder)
     located = score_sequence(row, found, task, map_alignment(mapped, DRIVE.truth()), tmp_path)
     summary = located.row.localization
@@ -182,7 +173,7 @@ def test_a_sequence_is_scored_where_the_saved_map_lies(monkeypatch, tmp_path):
 
 
 def test_a_sequence_that_failed_or_does_not_fit_says_so(monkeypatch, tmp_path):
-    row = SequenceRow(method=METHOD, number=1, length_m=500.0)
+    row = SequenceRow(method=ORBSLAM3.label, number=1, length_m=500.0)
     lost = run(monkeypatch, tmp_path, tracked="3", loaded=tmp_path)
     task = RunTask(Path(), Path(), DRIVE, tmp_path)
     assert "lost" in score_sequence(row, lost, task, None, tmp_path).row.failure
@@ -192,7 +183,7 @@ def test_a_sequence_that_failed_or_does_not_fit_says_so(monkeypatch, tmp_path):
 
 def test_a_sequence_takes_the_frames_of_its_steps(tmp_path):
     mapped = RunTask(Path("python"), Path("words"), DRIVE, tmp_path / "run-0", paced=True)
-    task = sequence_task(SequenceRow(method=METHOD, number=10, length_m=10.0), DRIVE, mapped)
+    task = sequence_task(SequenceRow(method=ORBSLAM3.label, number=10, length_m=10.0), DRIVE, mapped)
     assert (task.drive.first, task.drive.frames) == (29, 10)
     assert task.loaded == mapped.folder
     assert task.paced

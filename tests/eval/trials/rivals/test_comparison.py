@@ -9,15 +9,17 @@ import pytest
 
 from hippodrome.core.types import Trajectory
 from hippodrome.eval.files.trajectories import write_tum
+from hippodrome.eval.methods.method import ORBSLAM3_FINAL, ORBSLAM3_LIVE
 from hippodrome.eval.metrics.localization import FALSE_FIX_M
 from hippodrome.eval.report.evidence import MapEvidence, read_map_evidence
-from hippodrome.eval.rivals.orbslam3.rows import FINAL, LIVE, tum_path
+from hippodrome.eval.results.table_two import LocalizedSequence, SequenceRow
+from hippodrome.eval.rivals.orbslam3.rows import tum_path
 from hippodrome.eval.rivals.orbslam3.stage import Tracked
 from hippodrome.eval.rivals.orbslam3.tracker import Run
-from hippodrome.eval.rivals.sequences import Located, SequenceRow
 from hippodrome.eval.trials.rivals import comparison
 from hippodrome.eval.trials.rivals.comparison import draw_comparison, draw_sequences
 
+LIVE, FINAL = ORBSLAM3_LIVE.label, ORBSLAM3_FINAL.label
 T_S = 0.1 * np.arange(400)
 TRUTH = Trajectory(T_S, np.column_stack([50.0 * np.cos(T_S / 8), 50.0 * np.sin(T_S / 8), T_S / 8 + np.pi / 2]))
 
@@ -69,7 +71,7 @@ def test_the_longest_sequence_that_all_finished_is_shown(folder, monkeypatch):
     score = SimpleNamespace(errors_m=np.array([FALSE_FIX_M]))
     rows = [("ours", 1, 170.0, score), ("ours", 2, 300.0, score), ("ours", 3, 800.0, score)]
     rows += [("theirs", 1, 170.0, score), ("theirs", 2, 300.0, score), ("theirs", 3, 800.0, None)]
-    found = [Located(SequenceRow(method=method, number=i, length_m=m), one) for method, i, m, one in rows]
+    found = [LocalizedSequence(SequenceRow(method=method, number=i, length_m=m), one) for method, i, m, one in rows]
     draw_sequences(materials(folder), found)
     ((title, scores),) = shown.items()
     assert "sequence 2, 300 m" in title

@@ -39,7 +39,7 @@ def scenario(tmp_path, monkeypatch):
     monkeypatch.setattr(stage, "ensure_environment", ensure_environment)
     monkeypatch.setattr(run, "gather", lambda scenario, out: None)
     monkeypatch.setattr(run, "with_peak_rss", lambda results, scenario, out, pool: results)
-    monkeypatch.setattr(run, "table_two", lambda materials: [])
+    monkeypatch.setattr(run, "localize_sequences", lambda materials: [])
     path = tmp_path / "hamlet.yaml"
     path.write_text(SCENARIO)
     return path

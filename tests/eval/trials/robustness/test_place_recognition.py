@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 
 from hippodrome.core.types import ViewCells
-from hippodrome.eval.trials.robustness.place_recognition import (
-    Answers,
-    curve,
-    half_known,
-    judged,
-    recall_at,
-)
+from hippodrome.eval.trials.robustness.place_recognition import Answers, half_known, judged
+from hippodrome.eval.trials.robustness.recall import curve, recall_at
 from tests.core.looped_world import Pictures, topometric_map
 
 PLACES_M = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [100.0, 0.0, 0.0]])
@@ -22,8 +17,8 @@ def answers(score, right, mapped):
 
 
 def test_answers_are_right_near_and_mapped_by_their_distances():
-    looks_m = np.array([[1.0, 0.0, 0.1], [1.0, 0.0, 0.1], [1.0, 0.0, 0.1], [112.0, 0.0, 0.0], [1.0, 0.0, np.pi]])
-    found = judged("x", np.array([0, 1, 2, 2, 0]), np.zeros(5), looks_m, PLACES_M)
+    queries_m = np.array([[1.0, 0.0, 0.1], [1.0, 0.0, 0.1], [1.0, 0.0, 0.1], [112.0, 0.0, 0.0], [1.0, 0.0, np.pi]])
+    found = judged("x", np.array([0, 1, 2, 2, 0]), np.zeros(5), queries_m, PLACES_M)
     assert found.right.tolist() == [True, True, False, True, False]  # the next place, 9 m on, shows the same street
     assert found.near.tolist() == [True, False, False, False, False]
     assert found.mapped.tolist() == [True, True, True, False, False]  # beyond the end of the road; the opposite way

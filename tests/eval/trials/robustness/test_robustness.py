@@ -7,30 +7,18 @@ import pytest
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.metrics.mapped_road import OnMap
-from hippodrome.eval.trials.robustness.cases import (
-    AFTER_M,
-    BEFORE_M,
-    JUMP_M,
-    Kidnapping,
-    PaperSequence,
-    _jumps,
-    kidnapping_summary,
-    paper_summary,
-)
 from hippodrome.eval.trials.robustness.conditions import CONDITIONS, SAME, chosen
+from hippodrome.eval.trials.robustness.findings import Findings, merged
+from hippodrome.eval.trials.robustness.kidnapping import AFTER_M, BEFORE_M, JUMP_M, Kidnapping, jumps, kidnapping_summary
+from hippodrome.eval.trials.robustness.localize import SEQUENCE_M, sequence_steps
+from hippodrome.eval.trials.robustness.paper_lengths import PaperSequence, paper_summary
 from hippodrome.eval.trials.robustness.place_recognition import Answers
-from hippodrome.eval.trials.robustness.places import PlaceResult
-from hippodrome.eval.trials.robustness.report import (
-    ELSEWHERE,
-    ConditionResult,
-    Findings,
-    SequenceResult,
-    markdown,
-    report,
-)
-from hippodrome.eval.trials.robustness.run import SEQUENCE_M, cuts, elsewhere
+from hippodrome.eval.trials.robustness.recall import PlaceResult
+from hippodrome.eval.trials.robustness.report import report_town, report_towns
+from hippodrome.eval.trials.robustness.run import elsewhere
+from hippodrome.eval.trials.robustness.sequences import ELSEWHERE, ConditionResult, SequenceResult
+from hippodrome.eval.trials.robustness.tables import conditions_markdown
 from hippodrome.eval.trials.robustness.targets import Target
-from hippodrome.eval.trials.robustness.towns import merged, report_towns
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import DriveSpec, Scenario
@@ -104,9 +92,9 @@ def straight_drive(tmp_path, length_m):
 
 
 def test_sequences_are_spread_evenly_over_the_drive(tmp_path):
-    assert cuts(straight_drive(tmp_path, 701), 3) == [(0, 301), (200, 501), (400, 701)]
+    assert sequence_steps(straight_drive(tmp_path, 701), 3) == [slice(0, 301), slice(200, 501), slice(400, 701)]
     with pytest.raises(HippodromeError, match="length_m"):
-        cuts(straight_drive(tmp_path, SEQUENCE_M - 1), 2)
+        sequence_steps(straight_drive(tmp_path, SEQUENCE_M - 1), 2)
 
 
 def sequence(after_m=10.0, errors_m=(1.0, 3.0), false_fixes=0, nees=1.0, number=1, way_m=300.0):
@@ -144,21 +132,21 @@ def test_a_start_without_mapped_road_is_not_judged():
 
 def test_a_condition_without_any_fix_is_a_row_all_the_same(tmp_path, capsys):
     results = [ConditionResult("same", (sequence(), sequence())), ConditionResult("night", (sequence(None, (), nees=None),) * 2)]
-    assert "| night | 0 % of 2 | - / - / - | - / - | -, - | 0 of 2 | - |" in markdown("town", results)
-    report(tmp_path, "town", findings(*results))
+    assert "| night | 0 % of 2 | - / - / - | - / - | -, - | 0 of 2 | - |" in conditions_markdown("town", results)
+    report_town(tmp_path, "town", findings(*results))
     written = json.loads((tmp_path / "robustness.json").read_text())
     assert written["conditions"][1]["error_mean_m"] is None
     files = ("robustness.png", "places.png", "robustness.json", "robustness.md")
     first = [(tmp_path / name).read_bytes() for name in files]
     assert all(len(content) > 500 for content in first)
-    report(tmp_path, "town", findings(*results))
+    report_town(tmp_path, "town", findings(*results))
     assert [(tmp_path / name).read_bytes() for name in files] == first
     assert "night" in capsys.readouterr().out
 
 
 def test_failures_say_how_to_run_them_again_and_the_yardsticks_have_rows(tmp_path, capsys):
     bad = sequence(40.0, (25.0,), false_fixes=1, number=7)
-    report(tmp_path, "town", findings(ConditionResult("same", (sequence(), bad)), ConditionResult("same", (bad,), "kalman")))
+    report_town(tmp_path, "town", findings(ConditionResult("same", (sequence(), bad)), ConditionResult("same", (bad,), "kalman")))
     text = (tmp_path / "robustness.md").read_text()
     assert "start 7: 1 false fixes; again: `--conditions same --start 7`" in text
     assert text.count("--start") == 1  # a yardstick's failures are its own
@@ -191,13 +179,13 @@ def test_another_town_has_other_streets():
 def test_kidnappings_jump_far_and_leave_room_to_recover(tmp_path):
     drive = straight_drive(tmp_path, 701)
     way_m = drive.samples.poses_m[:, 0]
-    jumps = _jumps(drive.samples.poses_m, way_m, 5)
-    assert len(jumps) == 5
-    for first, jump, landing, end in jumps:
-        assert jump - first == BEFORE_M
-        assert end - landing == AFTER_M
-        assert abs(landing - jump) > JUMP_M
-    assert _jumps(drive.samples.poses_m[:150], way_m[:150], 5) == []
+    found = jumps(drive.samples.poses_m, way_m, 5)
+    assert len(found) == 5
+    for jump in found:
+        assert jump.leap - jump.first == BEFORE_M
+        assert jump.end - jump.landing == AFTER_M
+        assert abs(jump.landing - jump.leap) > JUMP_M
+    assert jumps(drive.samples.poses_m[:150], way_m[:150], 5) == []
 
 
 def test_kidnappings_without_recovery_count_as_infinitely_far():

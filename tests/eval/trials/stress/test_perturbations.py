@@ -7,7 +7,8 @@ from numpy.testing import assert_array_equal
 from hippodrome.core.types import EdgeKind, HippodromeError
 from hippodrome.eval.trials.stress.cases import CASES, chosen_cases, in_self_similar_grid
 from hippodrome.eval.trials.stress.perturbations import with_false_closures, without_roads
-from hippodrome.eval.trials.stress.table import StressRow, stress_markdown
+from hippodrome.eval.trials.stress.rows import StressRow
+from hippodrome.eval.trials.stress.table import stress_markdown
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.town import build_town
 from tests.core.synthetic import grid_network, semi_metric_drive

@@ -1,0 +1,88 @@
+"""Files that are whole or absent, and hashes of files and of code. For all parts of the package; not public.
+
+This module lies beneath ``core``, ``sim``, ``proto`` and ``eval``, so that each of them may use it. It imports the standard
+library and ``HippodromeError``, nothing else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+from hippodrome.core.types import HippodromeError
+
+PACKAGE: Final = Path(__file__).parent  # the folder in which ``core``, ``sim``, ``proto`` and ``eval`` lie
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a temporary file beside ``path``, which takes that name only when the block ends without an error.
+
+    By then its bytes are on disk; until then, and after an error, whatever was at ``path`` stays as it was. The folder is made
+    if need be. The finished file may be read by everybody.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        with temporary.open("rb+") as written:
+            os.fsync(written.fileno())
+        temporary.chmod(0o644)  # a temporary file is private by default
+        temporary.replace(path)
+        _sync_folder(path.parent)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Replace the file ``path`` by ``data``, as ``replacing`` does. Raises HippodromeError if it cannot be written."""
+    try:
+        with replacing(path) as temporary:
+            temporary.write_bytes(data)
+    except OSError as error:
+        raise HippodromeError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file as 64 hexadecimal digits. The file is read in pieces, so it may be larger than memory."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def code_sha256(root: Path, patterns: Iterable[str]) -> str:
+    """One hash, 16 hexadecimal digits, of the names and contents of all files below ``root`` that match a pattern.
+
+    Results that are kept on disk carry it, so that those of other code are not taken for finished. It is computed once in a
+    process: code that changes while a command runs is not the code that runs.
+
+    Args:
+        root: Folder that the patterns start from; names are hashed relative to it.
+        patterns: Patterns of ``Path.glob``, for instance ``core/**/*.py``.
+    """
+    return _code_sha256(root, tuple(patterns))
+
+
+@lru_cache(maxsize=8)
+def _code_sha256(root: Path, patterns: tuple[str, ...]) -> str:
+    digest = hashlib.sha256()
+    for path in sorted({path for pattern in patterns for path in root.glob(pattern)}):
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _sync_folder(folder: Path) -> None:
+    """Put a new name on disk: renaming a file changes its folder, which has a cache of its own."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,56 @@
+"""How a measured pose enters a belief: with the incumbent, with the challenger, or as a new challenger.
+
+The belief keeps one pose, the incumbent. A measurement that conflicts with it may be an outlier, or tell that the incumbent is
+wrong. It is therefore kept as a challenger beside it, until further measurements decide (``core.localization.fix``).
+"""
+
+from __future__ import annotations
+
+from hippodrome.core.localization.beliefs.belief import CompetingBelief, PoseBelief, competes
+from hippodrome.core.localization.beliefs.motion import PoseMeasurement
+from hippodrome.core.localization.fix import Relation
+from hippodrome.core.localization.places import is_same_place
+from hippodrome.core.types import FloatArray
+
+
+def relation_of(measurement: PoseMeasurement, belief: PoseBelief, adopted: bool, gate: float) -> Relation:
+    """What a measured pose agrees with.
+
+    Args:
+        measurement: the measured pose.
+        belief: the belief before it.
+        adopted: whether the belief has an incumbent yet.
+        gate: squared Mahalanobis distance up to which a measurement agrees with a hypothesis. With the incumbent it agrees also
+            if it lies in the same place: then noise divides them, not another hypothesis.
+    """
+    if not competes(belief):
+        return Relation.ALL_HYPOTHESES
+    if adopted and (belief.sq_distance(measurement) <= gate or is_same_place(belief.pose, measurement.pose)):
+        return Relation.INCUMBENT
+    if belief.challenged and belief.sq_distance(measurement, challenger=True) <= gate:
+        return Relation.CHALLENGER
+    return Relation.NEITHER
+
+
+def updated(
+    belief: PoseBelief, measurement: PoseMeasurement, relation: Relation, challenger_wins: bool, gate: float
+) -> PoseBelief:
+    """The belief after a measured pose that stands in this relation to it."""
+    if not competes(belief):
+        return belief.inject(measurement)
+    if relation is Relation.INCUMBENT:
+        return belief.inject(_bounded(measurement, belief, gate))
+    if relation is Relation.CHALLENGER:
+        reinforced = belief.reinforce(measurement)
+        return reinforced.adopt() if challenger_wins else reinforced
+    return belief.challenge(measurement)
+
+
+def _bounded(measurement: PoseMeasurement, belief: CompetingBelief, gate: float) -> PoseMeasurement:
+    """A measurement beyond the gate with its covariance grown by the excess, so that an outlier moves the incumbent little.
+
+    This is the robust weight of Student's distribution: it falls with the squared distance.
+    """
+    excess = max(1.0, belief.sq_distance(measurement) / gate)
+    covariance: FloatArray = excess * measurement.covariance
+    return PoseMeasurement(measurement.pose, covariance)

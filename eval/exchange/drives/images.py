@@ -1,0 +1,50 @@
+"""The images of a foreign drive: where they lie, and how they become frames. None is trusted to be what it says it is."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from hippodrome.core.types import Frame
+from hippodrome.eval.exchange.drives.errors import ExchangeError
+from hippodrome.eval.exchange.drives.foreign import ForeignFrame
+
+MAX_IMAGE_BYTES: Final = 64 << 20
+MAX_PIXELS: Final = 64_000_000  # a hostile image can claim any size in a few bytes
+
+
+def decode(frame: ForeignFrame) -> Frame:
+    """The frame as RGB (H, W, 3), 8 bits: grey is repeated, alpha dropped, 16 bits are scaled. Raises ExchangeError."""
+    blob = frame.load()
+    if len(blob) > MAX_IMAGE_BYTES:
+        raise ExchangeError(f"{frame.name}: {len(blob)} bytes, the limit is {MAX_IMAGE_BYTES}")
+    try:
+        with Image.open(io.BytesIO(blob)) as header:  # reads no pixel
+            width, height = header.size
+    except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise ExchangeError(f"{frame.name}: not an image ({' '.join(str(error).split())[:80]})") from None
+    if width * height > MAX_PIXELS or min(width, height) < 16:
+        raise ExchangeError(f"{frame.name}: {width} x {height} pixels; at least 16 a side, at most {MAX_PIXELS} in all")
+    image: Any = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
+    if image is None or image.shape[:2] != (height, width):
+        raise ExchangeError(f"{frame.name}: a damaged image")
+    return np.ascontiguousarray(image[:, :, ::-1])
+
+
+def file_frame(t_s: float, path: Path) -> ForeignFrame:
+    """A frame in an image file of its own. Nothing is read before it is loaded."""
+
+    def load() -> bytes:
+        try:
+            if (size := path.stat().st_size) > MAX_IMAGE_BYTES:
+                raise ExchangeError(f"{path}: {size} bytes, the limit is {MAX_IMAGE_BYTES}")
+            return path.read_bytes()
+        except OSError as error:
+            raise ExchangeError(f"{path}: cannot be read: {error.strerror}") from None
+
+    return ForeignFrame(t_s, str(path), load)

@@ -1,0 +1,89 @@
+"""Files are whole or absent, and hashes of code tell a changed, a renamed and a new file."""
+
+import ast
+import hashlib
+import sys
+from pathlib import Path
+
+import pytest
+
+from hippodrome import _files
+from hippodrome._files import code_sha256, replacing, sha256_of, write_atomically
+from hippodrome.core.types import HippodromeError
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_file_takes_its_name_when_the_block_ends(tmp_path):
+    path = tmp_path / "new" / "a.txt"
+    with replacing(path) as temporary:
+        temporary.write_text("whole")
+        assert not path.exists()
+        assert temporary.parent == path.parent
+    assert path.read_text() == "whole"
+    assert path.stat().st_mode & 0o777 == 0o644
+    assert names(path.parent) == ["a.txt"]
+
+
+def test_an_error_leaves_what_was_there(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("precious")
+    with pytest.raises(KeyError), replacing(path) as temporary:
+        temporary.write_text("half")
+        raise KeyError
+    assert path.read_text() == "precious"
+    assert names(tmp_path) == ["a.txt"]
+
+
+def test_what_cannot_be_written_is_said_in_one_line(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(HippodromeError, match=r"file/a\.txt: cannot be written: (Not a directory|File exists)"):
+        write_atomically(tmp_path / "file" / "a.txt", b"x")
+    with pytest.raises(HippodromeError, match=r": cannot be written: Is a directory"):
+        (tmp_path / "folder").mkdir()
+        write_atomically(tmp_path / "folder", b"x")
+    assert names(tmp_path) == ["file", "folder"]
+    write_atomically(tmp_path / "a.txt", b"one")
+    write_atomically(tmp_path / "a.txt", b"two")
+    assert (tmp_path / "a.txt").read_bytes() == b"two"
+
+
+def test_a_files_hash_is_sha256(tmp_path):
+    (tmp_path / "a").write_bytes(b"x" * 1_000_000)
+    assert sha256_of(tmp_path / "a") == hashlib.sha256(b"x" * 1_000_000).hexdigest()
+
+
+def test_the_hash_of_code_is_of_names_and_contents_also_behind_a_link(tmp_path):
+    def hashed(name, change=lambda root: None):
+        root = tmp_path / name
+        (root / "part" / "inner").mkdir(parents=True)
+        (root / "part" / "a.py").write_text("a = 1")
+        (root / "part" / "inner" / "b.py").write_text("b = 1")
+        (root / "other.py").write_text("c = 1")
+        change(root)
+        return code_sha256(root, ["part/**/*.py"])
+
+    first = hashed("one")
+    assert len(first) == 16
+    assert hashed("same") == first
+    assert hashed("unasked", lambda root: (root / "other.py").write_text("c = 2")) == first
+    changed = {
+        hashed("changed", lambda root: (root / "part" / "inner" / "b.py").write_text("b = 2")),
+        hashed("renamed", lambda root: (root / "part" / "a.py").rename(root / "part" / "c.py")),
+        hashed("new", lambda root: (root / "part" / "inner" / "d.py").write_text("")),
+    }
+    assert len(changed | {first}) == 4
+    (tmp_path / "linked").mkdir()
+    (tmp_path / "linked" / "part").symlink_to(tmp_path / "one" / "part")
+    assert code_sha256(tmp_path / "linked", ["part/**/*.py"]) == first
+
+
+def test_it_lies_beneath_all_parts():
+    """It imports the standard library and the error of ``core.types``, so that every part may import it."""
+    found = set()
+    for node in ast.walk(ast.parse(Path(_files.__file__).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom | ast.Import):
+            found |= {node.module} if isinstance(node, ast.ImportFrom) else {alias.name for alias in node.names}
+    assert {name for name in found if name.split(".")[0] not in sys.stdlib_module_names} == {"hippodrome.core.types"}

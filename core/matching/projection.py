@@ -72,7 +72,7 @@ def _cheapest_path(cost: FloatArray, arc: FloatArray, driven: FloatArray) -> Int
     return column
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _cheapest_step(total: FloatArray, arc: FloatArray, i: int, j: int, driven_m: float) -> tuple[float, int]:
     """Cheapest way to sample ``j`` of row ``i``: its cost, and the column of row ``i - 1`` that it comes from."""
     sigma = _STEP_SIGMA_M + _STEP_SHARE * driven_m

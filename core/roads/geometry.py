@@ -9,9 +9,11 @@ direction; ``points_between_vertices`` interpolates linearly between the two nei
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hippodrome.core.roads.network import RoadNetwork
@@ -133,7 +135,7 @@ def entry_position_m(position_m: float, length_m: float, entered_length_m: float
     return position_m * (entered_length_m / max(length_m, SHORTEST_LANE_M))
 
 
-def number_pieces(count: IntArray) -> tuple[IntArray, IntArray]:
+def number_pieces(count: NDArray[np.integer[Any]]) -> tuple[IntArray, NDArray[np.integer[Any]]]:
     """Owner and number of every piece, if owner ``i`` is cut into ``count[i]`` pieces.
 
     Returns:

@@ -55,7 +55,9 @@ def carriageways(geometry: RoadGeometry) -> tuple[IntArray, FloatArray]:
     return label.astype(np.int32), length
 
 
-def route_distances_m(table: RouteTable, start: IntArray, lane: IntArray, position_m: FloatArray) -> tuple[IntArray, FloatArray]:
+def route_distances_m(
+    table: RouteTable, start: IntArray, lane: IntArray, position_m: FloatArray
+) -> tuple[NDArray[np.int64], FloatArray]:
     """Driving distances between all candidates of consecutive vertices.
 
     Args:
@@ -178,9 +180,9 @@ def _driving_distance(i: int, j: int, candidates: _Candidates, drives: _Drives) 
     source, target = candidates.carriageway[i], candidates.carriageway[j]
     forward = (candidates.share[j] - candidates.share[i]) * drives.length_m[source]
     if source == target and forward >= -BACKWARD_SLACK_M:
-        return abs(forward)
+        return float(abs(forward))
     begin, end = drives.start[source], drives.start[source + 1]
     k = begin + np.searchsorted(drives.target[begin:end], target)
     if k < end and drives.target[k] == target:
-        return candidates.to_end_m[i] + drives.gap_m[k] + candidates.position_m[j]
+        return float(candidates.to_end_m[i] + drives.gap_m[k] + candidates.position_m[j])
     return np.inf

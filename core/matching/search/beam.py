@@ -192,7 +192,7 @@ def backward(
         survivors: of the forward pass.
         onward_nats: best score on from each survivor of the last sample; 0 if the drive ends there.
     """
-    row_start, rows = survivors.row_start, survivors.hypotheses
+    row_start, rows, places = survivors
     times = row_start.shape[0] - 1
     through = np.full(rows.shape[0], NOWHERE, np.float32)
     best = NOWHERE
@@ -202,7 +202,8 @@ def backward(
     scratch = _make_scratch(model)
     for t in range(times - 1, 0, -1):
         begin, end = row_start[t - 1], row_start[t]
-        observation, (jump_from, _) = observation_of_step(drive, t), jump_bar(rows[begin:end])
+        observation = observation_of_step(drive, t)
+        jump_from, _ = jump_bar(rows[begin:end])
         most_onward = _prune_and_index(survivors, through, t, best - margin_nats, scratch)
         for i in range(begin, end):
             score = rows[i].score_nats
@@ -210,7 +211,7 @@ def backward(
             if most_cost < 0.0:
                 continue
             may_jump = score >= jump_from
-            found = successors(rows[i], survivors.places, observation, model, may_jump, most_cost, scratch.successors)
+            found = successors(rows[i], places, observation, model, may_jump, most_cost, scratch.successors)
             _pass_back(rows, through, i, scratch.successors[:found], scratch)
         _forget_states(rows[end : row_start[t + 1]], scratch)
     for i in range(rows.shape[0]):

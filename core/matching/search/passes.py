@@ -1,8 +1,8 @@
 """Forward and backward pass of the search over a whole drive, in bounded memory.
 
 The forward pass keeps its survivors at checkpoints only. The backward pass begins with the last section of the drive and makes
-the survivors of each section anew from its checkpoint (as in J. A. Grice, R. Hughey, D. Speck, "Reduced space sequence alignment",
-1997). The answer is that of one search over the whole drive; a drive of a single section is searched once.
+the survivors of each section anew from its checkpoint, as in J. A. Grice, R. Hughey, D. Speck, "Reduced space sequence
+alignment", 1997. The answer is that of one search over the whole drive; a drive of a single section is searched once.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
 import numpy as np
 
+from hippodrome.core.matching.confidence import (
+    ConfidenceConfig,
+    distant_gap,
+    match_breaks,
+    match_status,
+    reject_displaced,
+)
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.route import Route, RouteAlternatives, search_route
 from hippodrome.core.matching.search.track import Track
-from hippodrome.core.matching.trust import (
-    ConfidenceConfig,
-    breaks,
-    distant_gap,
-    judge,
-    settled,
-)
 from hippodrome.core.types import MatchStatus, StartPose
 from tests.core.matching.drives import misplaced_m, random_drive, square_grid
 from tests.core.synthetic import grid_network
@@ -50,7 +50,7 @@ def test_each_status_has_its_reason():
         total_nats=0.0,
         alternatives=RouteAlternatives(rows, rivals, through.ravel()),
     )
-    status = judge(route, CONFIG)
+    status = match_status(route, CONFIG)
     assert set(status[:30]) == {MatchStatus.AMBIGUOUS}
     assert status[35] == MatchStatus.MATCHED
     assert set(status[55:75]) == {MatchStatus.OFF_NETWORK}
@@ -59,23 +59,23 @@ def test_each_status_has_its_reason():
 
 
 def test_breaks_name_every_run_with_its_cause():
-    found = breaks(np.array([0, 1, 1, 2, 0, 0, 1], dtype=np.uint8))
+    found = match_breaks(np.array([0, 1, 1, 2, 0, 0, 1], dtype=np.uint8))
     assert [(b.first_vertex, b.last_vertex, b.status) for b in found] == [
         (1, 2, MatchStatus.AMBIGUOUS),
         (3, 3, MatchStatus.OFF_NETWORK),
         (6, 6, MatchStatus.AMBIGUOUS),
     ]
     assert all(b.cause for b in found)
-    assert breaks(np.zeros(4, dtype=np.uint8)) == ()
+    assert match_breaks(np.zeros(4, dtype=np.uint8)) == ()
 
 
 def test_a_self_similar_grid_is_ambiguous_without_a_prior_and_matched_with_one():
     network = square_grid(columns=3, rows=3)
     visits, poses, _ = random_drive(network, 3, 500.0)
-    blind = judge(search_route(visits, network, RouteSearchConfig()), CONFIG)
+    blind = match_status(search_route(visits, network, RouteSearchConfig()), CONFIG)
     assert np.all(blind == MatchStatus.AMBIGUOUS)
     told = search_route(visits, network, RouteSearchConfig(), StartPose(*poses[0]))
-    status = judge(told, CONFIG, start_known=True)
+    status = match_status(told, CONFIG, start_known=True)
     assert np.mean(status == MatchStatus.MATCHED) > 0.85  # the last straight shows no scale: it may end 30 m farther
     assert misplaced_m(told, poses).max() < 6.0
 
@@ -86,7 +86,7 @@ def test_what_is_accepted_is_right_on_short_drives_too():
     for seed in range(4):
         visits, poses, _ = random_drive(network, seed, 350.0, turn_noise_rad=0.004)
         route = search_route(visits, network, RouteSearchConfig())
-        matched = judge(route, CONFIG) == MatchStatus.MATCHED
+        matched = match_status(route, CONFIG) == MatchStatus.MATCHED
         accepted += matched.any()
         assert misplaced_m(route, poses)[matched].max(initial=0.0) < 15.0
     assert accepted > 0
@@ -99,16 +99,16 @@ def test_another_town_is_not_matched():
             grid_network(np.random.default_rng(seed), columns=3, rows=3), seed, 800.0, turn_noise_rad=0.004
         )
         route = search_route(visits, grid_network(np.random.default_rng(30 + seed), columns=3, rows=3), RouteSearchConfig())
-        status = judge(route, CONFIG)
+        status = match_status(route, CONFIG)
         assert not np.any(status == MatchStatus.MATCHED)
-        assert sum(b.last_vertex - b.first_vertex + 1 for b in breaks(status)) == len(status)
+        assert sum(b.last_vertex - b.first_vertex + 1 for b in match_breaks(status)) == len(status)
 
 
-def test_a_vertex_that_the_refinement_drags_away_is_not_vouched_for():
+def test_a_vertex_that_the_refinement_drags_away_becomes_ambiguous():
     network = grid_network(np.random.default_rng(2), columns=3, rows=3)
     visits, poses, _ = random_drive(network, 0, 350.0)
     route = search_route(visits, network, RouteSearchConfig(), StartPose(*poses[0]))
     status = np.full(len(poses), MatchStatus.MATCHED, dtype=np.uint8)
-    assert np.array_equal(settled(status, route, poses, CONFIG), status)
+    assert np.array_equal(reject_displaced(status, route, poses, CONFIG), status)
     dragged = poses + np.where(np.arange(len(poses)) == 5, 20.0, 0.0)[:, None]
-    assert np.flatnonzero(settled(status, route, dragged, CONFIG)).tolist() == [5]
+    assert np.flatnonzero(reject_displaced(status, route, dragged, CONFIG)).tolist() == [5]

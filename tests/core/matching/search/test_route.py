@@ -38,10 +38,10 @@ def test_alternatives_are_the_good_ones_and_the_best_is_among_them(town, drive):
     np.testing.assert_allclose(np.maximum.reduceat(alternatives.through_nats, alternatives.row_start[:-1]), 0.0, atol=1e-2)
 
 
-def test_a_drive_searched_in_stretches_gives_the_same_answer(town, drive, monkeypatch):
+def test_a_drive_searched_in_sections_gives_the_same_answer(town, drive, monkeypatch):
     visits, poses, _ = drive
     once = search_route(visits, town, CONFIG, StartPose(*poses[0]))
-    monkeypatch.setattr(search_passes, "_MOST_ROWS", 20_000)
+    monkeypatch.setattr(search_passes, "_MAX_ROWS", 20_000)
     parts = search_route(visits, town, CONFIG, StartPose(*poses[0]))
     np.testing.assert_array_equal(parts.points_m, once.points_m)
     np.testing.assert_array_equal(parts.score_nats, once.score_nats)

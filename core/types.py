@@ -47,6 +47,7 @@ class ShortRepr:
 
 
 def _short(value: Any) -> str:
+    """One value in a ``repr`` of one line: an array by type and shape, a long tuple by its length."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{list(value.shape)}"
     if isinstance(value, tuple) and len(value) > 4:
@@ -92,7 +93,7 @@ class Observation(ShortRepr):
 
 
 def _check_frame(frame: Frame, t_s: float) -> None:
-    """An image is 8 bits deep, grey (H, W) or RGB (H, W, 3), and not empty. Raises ObservationError."""
+    """Raise ObservationError unless the frame is an image of 8 bits, grey (H, W) or RGB (H, W, 3), and not empty."""
     shape = getattr(frame, "shape", None)
     if isinstance(frame, np.ndarray) and frame.dtype == np.uint8 and frame.size and (frame.ndim == 2 or frame.shape[2:] == (3,)):
         return

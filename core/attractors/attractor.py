@@ -113,9 +113,9 @@ def circular_mean(mu_a: Real, mu_b: Real, weight_b: Real) -> Real:
 
 @njit(cache=True)
 def inject(mu_cali: Real, r_cali: Real, mu_inject: Real, r_inject: Real) -> tuple[Real, Real]:
-    """Eqs. (13)-(14), Li et al. 2025: a recognised view feeds the calibration cells, as a product of two Gaussians.
+    """Eqs. (13)-(14), Li et al. 2025: inject the mean ``mu_inject`` of a recognised view, with reliability ``r_inject``.
 
-    The view speaks for the mean ``mu_inject`` with reliability ``r_inject``; returns the new mean and reliability.
+    The belief of the calibration cells is multiplied by the view's, both Gaussians; returns the new mean and reliability.
     """
     r_new = r_cali + r_inject
     return circular_mean(mu_cali, mu_inject, r_inject / r_new), r_new
@@ -123,7 +123,7 @@ def inject(mu_cali: Real, r_cali: Real, mu_inject: Real, r_inject: Real) -> tupl
 
 @njit(cache=True)
 def read_out(mu_inte: Real, r_inte: Real, mu_cali: Real, r_cali: Real) -> tuple[Real, Real]:
-    """Eqs. (15)-(16), Li et al. 2025: mean and reliability of both populations' beliefs together, a product of Gaussians."""
+    """Eqs. (15)-(16), Li et al. 2025: mean and reliability of the fused belief, the product of both populations' Gaussians."""
     r_f = total_information(r_inte, r_cali)
     return circular_mean(mu_inte, mu_cali, r_cali / r_f), r_f
 
@@ -139,10 +139,10 @@ def overlap(mu_inte: Real, r_inte: Real, mu_cali: Real, r_cali: Real) -> Real:
 def forget(
     mu_inte: Real, r_inte: Real, mu_cali: Real, r_cali: Real, sq_sigma_inte: Real, sq_sigma_cali: Real
 ) -> tuple[Real, Real]:
-    """Reliabilities after path integration has added the variances ``sq_sigma_*`` (mode "bounded"; the paper adds none).
+    """Reliabilities after path integration has added the variances ``sq_sigma_*`` in rad^2 (mode "bounded"; the paper adds none).
 
-    Populations that agree (``overlap`` 1) share one belief and fade together: 1 / W grows by the variance. Populations in
-    conflict (``overlap`` 0) are two beliefs: each one's own variance 1 / r grows by it.
+    Populations that agree (``overlap`` 1) share one belief, so that they lose reliability together: the variance 1 / W of the
+    fused belief grows. Populations in conflict (``overlap`` 0) are two beliefs: the variance 1 / r of each one grows by itself.
     """
     shared = overlap(mu_inte, r_inte, mu_cali, r_cali)
     inte = r_inte / (1.0 + sq_sigma_inte * (r_inte + shared * r_cali))
@@ -153,7 +153,10 @@ def forget(
 def _inhibit(
     mean: FloatArray, reliability: FloatArray, information: FloatArray, deltas: tuple[float, float], floor: float, paper: bool
 ) -> FloatArray:
-    """Mutual, then global inhibition of every pair of populations: new reliabilities (M, 2, A); ``information`` E (M,)."""
+    """Mutual, then global inhibition of every pair of populations: new reliabilities (M, 2, A).
+
+    ``information`` (M,) is E of each module; mode "paper" or "bounded" is chosen by ``paper``, see ``inhibit``.
+    """
     result = reliability.copy()
     for m in range(mean.shape[0]):
         total, least = information[m], floor * information[m]

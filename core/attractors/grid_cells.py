@@ -41,16 +41,16 @@ def module_periods(smallest: float) -> FloatArray:
 
 
 def information(period: FloatArray, config: AttractorConfig) -> FloatArray:
-    """E of each module, (M,) in 1/rad^2, so that all limit a position to the same sigma in length.
+    """E of each module, (M,) in 1/rad^2, scaled so that all modules know a position to the same sigma in length at best.
 
-    The same length is a smaller phase on a larger torus, so that 1/rad^2 grows with the squared period.
+    The same length is a smaller phase on a larger torus, so that E in 1/rad^2 grows with the squared period.
     """
     scaled: FloatArray = config.information * (period / period[0]) ** 2
     return scaled
 
 
 def uniform(period: FloatArray, config: AttractorConfig) -> GridState:
-    """No prior knowledge: all populations as good as flat. ``period`` (M,)."""
+    """A state without prior knowledge: the beliefs of all populations are as good as flat. ``period`` is (M,)."""
     flat = np.broadcast_to(config.floor * information(period, config)[:, None, None], (len(period), 2, 2)).copy()
     return GridState(period, np.zeros((len(period), 2, 2)), flat)
 
@@ -125,7 +125,7 @@ def inhibit(state: GridState, dt_s: float, config: AttractorConfig) -> GridState
 
 
 def stimulate(state: GridState, position: FloatArray, reliability: FloatArray) -> GridState:
-    """A view speaks for a position (2,): Eqs. (13)-(14), Li et al. 2025, on the calibration cells alone.
+    """Inject the position (2,) that a recognised view shows: Eqs. (13)-(14), Li et al. 2025, on the calibration cells alone.
 
     ``reliability`` (2 axes,) is in 1/length^2.
     """
@@ -143,16 +143,19 @@ def inject(state: GridState, position: FloatArray, reliability: FloatArray, conf
 
 
 def hand_back(state: GridState, config: AttractorConfig) -> GridState:
-    """Both populations take over the fused belief of Eqs. (15)-(16) and share its information.
+    """Let both populations take over the fused belief of Eqs. (15)-(16) and share its information between them.
 
-    A departure, of mode "bounded" only; ``head_direction.hand_back`` says why.
+    This is a departure from the paper, for mode "bounded" only: without it an injection would never reach the integrators.
     """
     mean, total = fused(state)
     return _shared(state, mean, total, config)
 
 
 def challenge(state: GridState, position: FloatArray, reliability: FloatArray) -> GridState:
-    """The calibration cells take over a conflicting position (2,), reliability (2,) in 1/length^2; the two then compete."""
+    """Let the calibration cells take over a position (2,) that conflicts with the belief; the integrators keep theirs.
+
+    ``reliability`` (2,) is in 1/length^2. From then on the two beliefs compete by inhibition.
+    """
     mean, total = state.mean_rad.copy(), state.reliability.copy()
     mean[:, CALIBRATION] = phase(position, state.period)
     total[:, CALIBRATION] = phase_reliability(reliability, state.period)
@@ -160,12 +163,16 @@ def challenge(state: GridState, position: FloatArray, reliability: FloatArray) -
 
 
 def adopt(state: GridState, population: int, config: AttractorConfig) -> GridState:
-    """The conflict is decided: both populations snap to the belief of the winning ``population``."""
+    """End the conflict: both populations take over the belief of the winning ``population``."""
     return _shared(state, state.mean_rad[:, population], state.reliability[:, population], config)
 
 
 def _shared(state: GridState, mean: FloatArray, total: FloatArray, config: AttractorConfig) -> GridState:
-    """One belief, phases and reliabilities (M, 2), in both populations, its information divided between them."""
+    """Give both populations the same belief, and divide its information between them.
+
+    ``mean`` and ``total`` (M, 2) are its phases and reliabilities. The fused belief of the two populations is then this belief
+    again.
+    """
     shares = np.array([1.0 - config.calibration_share, config.calibration_share])
     return GridState(state.period, np.repeat(mean[:, None, :], 2, axis=1), total[:, None, :] * shares[None, :, None])
 
@@ -182,13 +189,13 @@ def fused(state: GridState) -> tuple[FloatArray, FloatArray]:
 
 
 def read_out(state: GridState, near: FloatArray, reach: float = 0.0) -> tuple[FloatArray, FloatArray]:
-    """The fused position, Eqs. (15)-(16), Li et al. 2025, and its reliability.
+    """The position that both populations of all modules encode together, Eqs. (15)-(16), Li et al. 2025, and its reliability.
 
     The modules hold one and the same belief on different tori, not independent ones: their reliabilities are averaged, not added.
 
     Args:
-        state: of all modules.
-        near: a prior position (2,), which tells the sheet.
+        state: state of all modules.
+        near: a prior position (2,). Phases repeat with the periods; the position is sought on the repetitions (sheets) near it.
         reach: sheets within this distance of ``near`` are tried; 0 takes the nearest one.
 
     Returns:
@@ -227,9 +234,10 @@ def _decode(mean: FloatArray, reliability: FloatArray, period: FloatArray, near:
 
 @njit(cache=True)
 def _decode_axis(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: int, near: float, reach: float) -> float:
-    """Coordinate on axis ``a``: on each sheet of the first module, all modules' weighted mean; that of the least misfit wins.
+    """Coordinate on axis ``a`` that fits the phases of all modules best.
 
-    Equal misfits are decided by the distance from ``near``.
+    On each sheet of the first module the modules' weighted mean is a candidate; the one of the least misfit wins, and of equal
+    misfits the one nearest to ``near``.
     """
     sheets = math.ceil(reach / period[0])
     home = near + wrap_compiled(mean[0, a] - 2.0 * math.pi * near / period[0]) * period[0] / (2.0 * math.pi)
@@ -244,7 +252,10 @@ def _decode_axis(mean: FloatArray, reliability: FloatArray, period: FloatArray, 
 
 @njit(cache=True)
 def _weighted_mean(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: int, about: float) -> float:
-    """Least-squares coordinate on axis ``a``, each module's phase unwrapped to the sheet that is nearest to ``about``."""
+    """Mean over the modules of the coordinate on axis ``a``, weighted by information: the least-squares solution.
+
+    A phase stands for many coordinates, one period apart; each module contributes the one nearest to ``about``.
+    """
     shift, weight = 0.0, 0.0
     for m in range(mean.shape[0]):
         per_length = 2.0 * math.pi / period[m]

@@ -25,7 +25,7 @@ class HeadDirectionState:
 
 
 def uniform(config: AttractorConfig) -> HeadDirectionState:
-    """No prior knowledge: both populations as good as flat."""
+    """A state without prior knowledge: the beliefs of both populations are as good as flat."""
     return HeadDirectionState(np.zeros(2), np.full(2, config.floor * config.information))
 
 
@@ -51,14 +51,14 @@ def integrate(
 
 
 def inhibit(state: HeadDirectionState, dt_s: float, config: AttractorConfig) -> HeadDirectionState:
-    """Mutual and global inhibition over ``dt_s``, Eqs. (3)-(7), Li et al. 2025."""
+    """Mutual and global inhibition over ``dt_s``, Eqs. (3)-(7), Li et al. 2025: reliabilities change, the means stay."""
     mean, reliability = state.mean_rad.reshape(1, 2, 1), state.reliability.reshape(1, 2, 1)
     inhibited = attractor.inhibit(mean, reliability, dt_s, config, np.array([config.information]))
     return HeadDirectionState(state.mean_rad, inhibited.reshape(2))
 
 
 def stimulate(state: HeadDirectionState, heading_rad: float, reliability: float) -> HeadDirectionState:
-    """A view speaks for ``heading_rad``: Eqs. (13)-(14), Li et al. 2025, on the calibration cells alone."""
+    """Inject the heading that a recognised view shows: Eqs. (13)-(14), Li et al. 2025, on the calibration cells alone."""
     mu_cali, r_cali = attractor.inject(state.mean_rad[CALIBRATION], state.reliability[CALIBRATION], heading_rad, reliability)
     return HeadDirectionState(np.array([state.mean_rad[INTEGRATOR], mu_cali]), np.array([state.reliability[INTEGRATOR], r_cali]))
 
@@ -70,17 +70,20 @@ def inject(state: HeadDirectionState, heading_rad: float, reliability: float, co
 
 
 def hand_back(state: HeadDirectionState, config: AttractorConfig) -> HeadDirectionState:
-    """Both populations take over the fused belief of Eqs. (15)-(16) and share its information: mode "bounded" only.
+    """Let both populations take over the fused belief of Eqs. (15)-(16) and share its information: mode "bounded" only.
 
-    A departure: as printed nothing moves from one population to the other, so that an injection never reaches the integrator and
-    is forgotten as soon as the calibration cells are inhibited.
+    This is a departure: as printed nothing moves from one population to the other, so that an injection never reaches the
+    integrator and is forgotten as soon as the calibration cells are inhibited.
     """
     heading_rad, reliability = read_out(state)
     return _shared(heading_rad, reliability, config)
 
 
 def challenge(state: HeadDirectionState, heading_rad: float, reliability: float) -> HeadDirectionState:
-    """The calibration cells take over a conflicting heading; the integrator keeps its own, and the two compete."""
+    """Let the calibration cells take over a heading that conflicts with the belief; the integrator keeps its own.
+
+    From then on the two beliefs compete by inhibition.
+    """
     return HeadDirectionState(
         np.array([state.mean_rad[INTEGRATOR], wrap_compiled(heading_rad)]),
         np.array([state.reliability[INTEGRATOR], reliability]),
@@ -88,12 +91,15 @@ def challenge(state: HeadDirectionState, heading_rad: float, reliability: float)
 
 
 def adopt(state: HeadDirectionState, population: int, config: AttractorConfig) -> HeadDirectionState:
-    """The conflict is decided: both populations snap to the belief of the winning ``population``; a mean would fit neither."""
+    """End the conflict: both populations take over the belief of the winning ``population``.
+
+    The mean of two beliefs in conflict would fit neither.
+    """
     return _shared(state.mean_rad[population], state.reliability[population], config)
 
 
 def _shared(heading_rad: float, reliability: float, config: AttractorConfig) -> HeadDirectionState:
-    """One belief in both populations, its information divided between them."""
+    """Give both populations the same belief, and divide its information between them."""
     shares = np.array([1.0 - config.calibration_share, config.calibration_share])
     return HeadDirectionState(np.full(2, heading_rad), reliability * shares)
 

@@ -35,7 +35,7 @@ def relation_of(measurement: PoseMeasurement, belief: PoseBelief, adopted: bool,
 def updated(
     belief: PoseBelief, measurement: PoseMeasurement, relation: Relation, challenger_wins: bool, gate: float
 ) -> PoseBelief:
-    """The belief after a measured pose that stands in this relation to it."""
+    """The belief after a measured pose that stands in the given ``relation`` to it; ``gate`` is that of ``relation_of``."""
     if not competes(belief):
         return belief.inject(measurement)
     if relation is Relation.INCUMBENT:
@@ -47,9 +47,10 @@ def updated(
 
 
 def _bounded(measurement: PoseMeasurement, belief: CompetingBelief, gate: float) -> PoseMeasurement:
-    """A measurement beyond the gate with its covariance grown by the excess, so that an outlier moves the incumbent little.
+    """Grow the covariance of a measurement beyond the gate, so that an outlier moves the incumbent only a little.
 
-    This is the robust weight of Student's distribution: it falls with the squared distance.
+    The covariance grows by the factor of the squared Mahalanobis distance over ``gate``. The weight of the measurement therefore
+    falls with the squared distance, as it does under a Student-t likelihood.
     """
     excess = max(1.0, belief.sq_distance(measurement) / gate)
     covariance: FloatArray = excess * measurement.covariance

@@ -65,7 +65,7 @@ class Fix:
     total: float = 0.0  # evidence of all views so far; only for beliefs without a challenger
     support: float = 0.0  # evidence of the incumbent, as far as remembered
     challenge: float = 0.0  # evidence of the challenger, as far as remembered
-    map_covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))  # of the map, where it was recognised last
+    map_covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))  # of the map where a view was recognised last
     sq_lateral_m2: float = 0.0  # squared disagreement of views with the belief across the road, a running mean
     place_z: float | None = None  # z-score of the believed place in the frames, a running mean; None: not seen since adopted
     on_map: bool = True  # whether cells of the map lie around the believed place
@@ -78,27 +78,27 @@ class RecognisedView:
 
     relation: Relation
     margin: float
-    weight: float  # 0 to 1: a frame close to the one before sees nearly the same
+    weight: float  # 0 to 1: less than 1 for a frame close to the one before, as the two show nearly the same
     map_covariance: FloatArray  # (3, 3) error of the map there
     sq_lateral_m2: float  # squared distance of the measured pose from the believed line of travel
 
     @property
     def evidence(self) -> float:
-        """The margin, as far as it is new."""
+        """The margin, discounted by how little new the frame shows."""
         return self.weight * self.margin
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceCheck:
-    """The believed place, held against the map and a query frame."""
+    """What the map and a query frame say about the believed place."""
 
-    on_map: bool  # whether cells of the map lie around it
-    may_be_on_road: bool  # whether a road of the network does
-    z_score: float | None  # of the best of those cells in this frame; None: none was scored
+    on_map: bool  # whether cells of the map lie around the believed pose
+    may_be_on_road: bool  # whether a road of the network may lie there
+    z_score: float | None  # z-score of the most similar of those cells in this frame; None: none was scored
 
 
 def faded(fix: Fix, config: LocalizerConfig) -> Fix:
-    """The evidence so far, one query frame later."""
+    """Discount the evidence for incumbent and challenger, once for each query frame."""
     return replace(fix, support=config.evidence_memory * fix.support, challenge=config.evidence_memory * fix.challenge)
 
 
@@ -147,9 +147,10 @@ def _adopted(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
 
 
 def checked(fix: Fix, check: PlaceCheck, config: LocalizerConfig) -> Fix:
-    """Where the map shows the believed place, a frame has to be like it, whatever else the frame is like.
+    """Enter the check of the believed place into the fix: is it on the map, can it be on a road, does the frame look like it?
 
-    A place that was just adopted is on the map, as a view cell has named it.
+    A place that was just adopted counts as on the map, since one of the map's view cells has measured it. Having left all roads
+    is remembered until a view agrees again. The z-score is averaged over frames, as a single frame may be hidden by a lorry.
     """
     on_map = check.on_map or fix.place_z is None
     return replace(

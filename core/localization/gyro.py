@@ -27,15 +27,15 @@ class GyroNoise:
 
 
 def update(state: GyroNoise, yaw_rate_radps: float, least_radps: float) -> GyroNoise:
-    """Take one yaw rate in.
+    """Update the estimate of the gyro's noise with one more yaw rate.
 
-    Sigma takes a step towards the value at which the second differences lie above and below their median equally often. The few
-    samples at the beginning of a turn, which no smooth motion explains, hardly move a median.
+    The estimated sigma takes a step up if the magnitude of the second difference exceeds the median that white noise of this
+    sigma would have, else a step down. A median is hardly moved by the few large differences at the beginning of a turn.
 
     Args:
         state: the estimate so far.
         yaw_rate_radps: the new sample.
-        least_radps: sigma is never taken to be smaller.
+        least_radps: lower bound of the estimated sigma, rad/s.
     """
     sigma = max(state.sigma_radps, least_radps)
     if state.samples >= 2:

@@ -38,7 +38,7 @@ from hippodrome.core.views.sequence import Step
 
 __all__ = ["Localizer", "LocalizerConfig", "localize"]
 
-LANE_M = 3.0  # largest lateral disagreement that tells of the lane: what is farther off is another place, or a bend
+LANE_M = 3.0  # a lateral disagreement counts as at most this: a larger one comes from another place or from a bend
 NOT_MOVED = Step(0.0, 0.0)
 
 
@@ -112,7 +112,11 @@ class Localizer:
         self._since_query = Step(self._since_query.length + travelled_m, self._since_query.turn_rad + turned_rad)
 
     def _query(self, frame: Frame) -> None:
-        """Recognise the place that a query frame shows, and update belief and fix."""
+        """Recognise the place that a query frame shows, and update belief and fix with it.
+
+        The cells of the believed place are taken before the belief is updated, so that the frame is compared with what was
+        believed without it.
+        """
         config, believed = self._config, self._believed_cells()
         match = self._recogniser.recognise(frame, self._since_query, believed)
         weight = 1.0 if self._match is None else min(1.0, self._since_query.length / config.independent_m)
@@ -125,15 +129,16 @@ class Localizer:
             self._fix = checked(self._fix, self._place_check(match, believed), config)
 
     def _believed_cells(self) -> IntArray:
-        """Cells of the believed place; none without a fix or off the map."""
+        """Return the cells around the believed pose; none without a fix, or where the map does not reach."""
         if not self._fix.adopted:
             return np.zeros(0, dtype=np.int32)
         return cells_around(self._places, self._belief.pose, _sigma_m(self._belief.covariance))
 
     def _measurement(self, match: PlaceMatch) -> PoseMeasurement:
-        """The pose of a recognised cell.
+        """Turn the match of a query frame into a measured pose, whose covariance is aligned with the heading of the cell.
 
-        Beyond the end of a mapped road its last cell still looks most alike, from as far off as two cells may be linked.
+        Once the vehicle has driven past the end of a mapped road, the last cell of the road still looks most alike. Its error
+        along the road may therefore be as large as the longest link between two cells.
         """
         noise, pose = self._config.injection, self._recogniser.pose(match)
         along_m = LINK_REACH_M if self._places.at_end[match.cell] else noise.along_m
@@ -142,7 +147,10 @@ class Localizer:
         return PoseMeasurement(pose, turn @ np.diag([along_m**2, noise.across_m**2, noise.heading_rad**2]) @ turn.T)
 
     def _take(self, measurement: PoseMeasurement, match: PlaceMatch, weight: float) -> None:
-        """Put a measured pose into the belief and its evidence into the fix; ``weight``: how much new the frame could show."""
+        """Update the belief with a measured pose, and the fix with the evidence for it.
+
+        ``weight`` (0 to 1) discounts a frame that was taken close to the one before it, since the two show nearly the same.
+        """
         config, belief, gate = self._config, self._belief, self._config.injection.gate
         relation = relation_of(measurement, belief, self._fix.adopted, gate)
         sq_lateral_m2 = _sq_lateral_m2(belief.pose, measurement.pose)
@@ -151,11 +159,15 @@ class Localizer:
         self._fix = recognised(self._fix, view, config)
 
     def _place_check(self, match: PlaceMatch, believed: IntArray) -> PlaceCheck:
-        """Hold the believed place, as it was before the frame, against the map and the frame."""
+        """Check whether the map covers the believed place, and whether the query frame looks like it.
+
+        ``believed`` (K,) are the cells around the pose that was believed before the frame. If there are none, the map does not
+        reach there, and it is checked whether the pose can at least be on a road of the network.
+        """
         pose, sigma_m = self._belief.pose, _sigma_m(self._belief.covariance)
         on_map = len(believed) > 0
         scored = match.scored
-        row = np.minimum(np.searchsorted(scored.cells, believed), len(scored.cells) - 1)
+        row = np.minimum(np.searchsorted(scored.cells, believed), len(scored.cells) - 1)  # scored cells are in ascending order
         similarity = scored.similarity[row[scored.cells[row] == believed]]
         return PlaceCheck(
             on_map=on_map,
@@ -164,7 +176,11 @@ class Localizer:
         )
 
     def _estimate(self, t_s: float) -> LocalizationEstimate:
-        """The answer: the belief's read-out, to whose covariance is added what averaging over views does not take away."""
+        """Return the estimate at ``t_s``: the believed pose, its covariance, and the status of the fix.
+
+        To the covariance of the belief are added the errors that successive views share, so that averaging over views cannot
+        reduce them: those of the map and the lateral ones.
+        """
         pose, covariance = self._belief.pose, self._belief.covariance
         state = status(self._fix, _sigma_m(covariance), self._config)
         activity = self._belief.activity()
@@ -183,29 +199,31 @@ class Localizer:
         )
 
     def _lateral_covariance(self, heading_rad: float) -> FloatArray:
-        """Covariance (3, 3) of lateral errors that views repeat for tens of metres, so that averaging does not take them away.
+        """Return the covariance (3, 3) of lateral errors that averaging over views cannot reduce.
 
-        Drivers wander in their lanes, which views hardly show. A drifting heading carries the pose along, and views disagree.
+        Such errors stay the same for tens of metres. One is the driver's wander within the lane, which views hardly show. The
+        other arises where a drifting heading pulls the pose aside: it is measured by how far views and belief disagree laterally.
         """
         left = np.array([-math.sin(heading_rad), math.cos(heading_rad), 0.0])
         return (self._config.injection.wander_m**2 + self._fix.sq_lateral_m2) * np.outer(left, left)
 
 
 def _sq_lateral_m2(believed: FloatArray, measured: FloatArray) -> float:
-    """Squared distance of a measured pose (3,) from the line of travel through the believed one, at most that of a lane."""
+    """Squared distance of a measured pose (3,) from the line of travel through the believed one, at most ``LANE_M`` squared."""
     east_m, north_m = measured[:2] - believed[:2]
     return min(float(north_m * math.cos(believed[2]) - east_m * math.sin(believed[2])) ** 2, LANE_M**2)
 
 
 def _sigma_m(covariance: FloatArray) -> float:
-    """Standard deviation of the position, the mean over directions."""
+    """Standard deviation of the position in metres, as the root mean square over both axes."""
     return float(np.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])))
 
 
 def _expected_log_scale(cognitive_map: CognitiveMap, config: LocalizerConfig) -> float:
-    """ln(metres per map unit) before anything is known of this drive.
+    """Return the ln(metres per map unit) that this drive is expected to have before anything is known of it.
 
-    Wheels have the same unit in both drives, so that it is the map's. Visual odometry measures in metres, by the camera's height.
+    Wheel odometry has the same unit in the mapping drive and in this one, so that the median scale of the map is expected. Visual
+    odometry measures in metres, since it knows the height of the camera, so that its log scale is 0.
     """
     if config.self_motion == "visual" or cognitive_map.log_scale is None:
         return 0.0

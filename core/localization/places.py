@@ -51,13 +51,13 @@ class PlaceMap:
 
 
 def make_place_map(cognitive_map: CognitiveMap, network: RoadNetwork | None, lane_sigma_m: float, map_sigma_m: float) -> PlaceMap:
-    """Lay a topometric map out for recognition.
+    """Prepare a topometric map for recognition: where each view cell was seen, and which cells lead to which.
 
     Args:
         cognitive_map: a map in the network frame.
         network: its road network. Where a single lane fits, poses are drawn towards the centre of that lane.
         lane_sigma_m: standard deviation of drivers about the centre of their lane; 0: poses stay as they are.
-        map_sigma_m: standard deviation of the map's error along the road that its own covariance does not state.
+        map_sigma_m: standard deviation of the map's error along the road, on top of what the map's own covariance states.
     """
     cells = len(cognitive_map.view_cells.templates)
     vertex = first_vertex(cognitive_map.view_cell, cells)
@@ -102,7 +102,7 @@ def _map_covariance(cognitive_map: CognitiveMap, vertex: IntArray, sigma_m: floa
 
 
 def lateral_variance(covariance: FloatArray, heading_rad: FloatArray) -> FloatArray:
-    """Variance (N,) of positions across their headings (N,), from covariances (N, 3, 3)."""
+    """Variance (N,) in m^2 of positions across their headings (N,), from the covariances (N, 3, 3) of the poses."""
     left = np.stack([-np.sin(heading_rad), np.cos(heading_rad)], axis=1)
     variance: FloatArray = np.einsum("ni,nij,nj->n", left, covariance[:, :2, :2], left)
     return variance
@@ -117,7 +117,7 @@ def is_same_place(pose_m: FloatArray, other_m: FloatArray) -> bool:
 def cells_around(places: PlaceMap, pose_m: FloatArray, sigma_m: float) -> IntArray:
     """Cells that show the place of ``pose_m`` (3,), or may show it, as the position is known to ``sigma_m`` only.
 
-    None means that the map does not reach there.
+    An empty result means that the map does not reach there.
     """
     near = np.array(places.tree.query_ball_point(pose_m[:2], SAME_PLACE_M + SURE_SIGMAS * sigma_m), dtype=np.int32)
     turn_rad = np.abs(se2.wrap(places.poses_m[near, 2] - pose_m[2]))
@@ -126,9 +126,9 @@ def cells_around(places: PlaceMap, pose_m: FloatArray, sigma_m: float) -> IntArr
 
 
 def may_be_on_road(places: PlaceMap, pose_m: FloatArray, sigma_m: float) -> bool:
-    """Whether a lane that leads the way of ``pose_m`` (3,) lies within what is known of the position, to ``sigma_m``.
+    """Whether the pose ``pose_m`` (3,) may be on a road, as its position is known to ``sigma_m`` only.
 
-    Without a network every place may be on a road.
+    It may be if a lane of about the same direction lies near enough, and always without a network.
     """
     if places.roads is None:
         return True
@@ -198,9 +198,9 @@ def _by_source(links: Predecessors) -> tuple[IntArray, IntArray]:
 
 
 def likely_cells(places: PlaceMap, filtered: Float32Array, hypotheses: int) -> IntArray:
-    """Cells that the best ``hypotheses`` cells of the query frame before lead to, with repetitions.
+    """Cells that one step of driving leads to from the ``hypotheses`` cells with the most evidence, with repetitions.
 
-    ``filtered`` (C,) is the evidence after that query frame.
+    ``filtered`` (C,) is the evidence after the query frame before.
     """
     best = np.flatnonzero(filtered > 0.0)
     if len(best) > hypotheses:
@@ -225,7 +225,10 @@ def _rows(numbers: IntArray, start: IntArray, values: IntArray) -> IntArray:
 
 
 def margin(places: PlaceMap, filtered: Float32Array, best: int) -> float:
-    """Evidence of the best cell minus that of the best one in another place; 0 when there is no other place."""
+    """Evidence of the best cell minus that of the best one at another place; 0 if there is no other place.
+
+    It says how clearly the place of the cell ``best`` stands out.
+    """
     rival = _best_elsewhere(places.poses_m, filtered, best)
     return float(filtered[best]) - rival if rival > -math.inf else 0.0
 

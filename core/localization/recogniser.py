@@ -51,12 +51,12 @@ class PlaceRecogniser:
         self._query_mean = start_query_mean(places.bank.mean, config.mean_trust)
 
     def recognise(self, frame: Frame, driven: Step, believed: IntArray = NO_CELLS) -> PlaceMatch:
-        """The place that a query frame shows.
+        """Find the place that a query frame shows.
 
         Args:
             frame: the query frame.
             driven: motion since the query frame before; its length in metres.
-            believed: cells of the place where the vehicle is believed to be: scored whatever the frame is like.
+            believed: cells of the believed place, which are scored even if their sketches do not resemble the frame.
         """
         config, places = self._config, self._places
         descriptor = describe(frame, config.views)
@@ -71,7 +71,7 @@ class PlaceRecogniser:
         return PlaceMatch(scored, cell, margin(places, self._filtered, cell))
 
     def z_score(self, scored: ScoredViews, similarity: Float32Array | float) -> Float32Array | float:
-        """How far a similarity lies above the mean of all cells, in their standard deviations."""
+        """How many standard deviations a similarity lies above the mean, both taken over all cells of the map."""
         return (similarity - scored.mean) / max(scored.spread, self._spread_floor)
 
     def pose(self, match: PlaceMatch) -> FloatArray:
@@ -81,7 +81,7 @@ class PlaceRecogniser:
         return interpolated_pose(self._places, similarity, match.cell)
 
     def _evidence(self, scored: ScoredViews, driven: Step) -> Float32Array:
-        """Sequence evidence (C,) after a query frame; too few cells make no statistics, and get z-scores of zero."""
+        """Sequence evidence (C,) after a query frame; on a map of fewer than ``min_cells`` cells all z-scores count as 0."""
         sequence, places = self._config.sequence, self._places
         enough = len(places.poses_m) >= sequence.min_cells
         z = self.z_score(scored, scored.similarity) if enough else np.zeros_like(scored.similarity)

@@ -55,7 +55,7 @@ class Closure:
     source: int  # vertex of the keyframe that made the view cell
     target: int  # vertex of the keyframe that was recognised
     motion: tuple[float, float, float]  # along, across, heading of the target seen from the source
-    spacing: float  # way between keyframes at the time, map units: the standard deviations are relative to it
+    spacing: float  # distance between keyframes at the time, map units: the standard deviations are relative to it
     margin: float  # filtered margin of the recognition
 
 
@@ -139,11 +139,11 @@ def relaxed_poses(motions: FloatArray, edges: Edges, config: ExperienceMapConfig
 
 
 def relax_ratslam(poses: FloatArray, edges: Edges, correction: float, sweeps: int) -> FloatArray:
-    """RatSLAM's correction of the experience map (Milford and Wyeth 2008): in turn, every edge moves its two ends together.
+    """Relax the experience map as RatSLAM does (Milford and Wyeth 2008): edge by edge, both ends are moved to reduce its error.
 
     Args:
         poses: before the correction, (V, 3).
-        edges: whose errors are corrected.
+        edges: odometry and closures, whose errors are corrected.
         correction: share of an edge's error that is corrected at once, half of it at either end.
         sweeps: passes over all edges.
 

@@ -97,13 +97,13 @@ class Mapper:
         )
 
     def _integrate_paths(self, observation: Observation) -> None:
-        """The motion of one observation into the networks, once they run."""
+        """Integrate the motion of one observation in the attractor networks, once they have started."""
         if self._neural is not None:
             motion = keyframes.arc_motion(observation.speed * observation.dt_s, observation.yaw_rate_radps * observation.dt_s)
             self._neural = networks.path_integrate(self._neural, motion, observation.dt_s, self._config.attractor)
 
     def _add_keyframe(self, t_s: float, frame: Frame) -> list[Recognition]:
-        """A new vertex; returns what places its view recognises."""
+        """Add a vertex for a new keyframe; returns the recognitions that its view triggers."""
         state, vertex = self._since_keyframe, len(self._t_s)
         self._t_s.append(t_s)
         self._motions.append(state.motion if vertex else np.zeros(3))
@@ -111,13 +111,13 @@ class Mapper:
         return self._memory.recognise(vertex, descriptor, state.travelled, float(state.motion[2]), state.spacing)
 
     def _close_loops(self, recognitions: list[Recognition]) -> None:
-        """A loop closure for each recognition, from the vertex that made the view cell to the one that was recognised."""
+        """Add a loop closure for each recognition, from the vertex that made the view cell to the one that was recognised."""
         for found in recognitions:
             source, motion = self._memory.cell_vertex[found.cell], (found.along, 0.0, found.heading_rad)
             self._closures.append(Closure(source, found.vertex, motion, self._since_keyframe.spacing, found.margin))
 
     def _reactivate(self, recognitions: list[Recognition]) -> None:
-        """The networks at this keyframe: started, or corrected by the view cell of its place, and recorded.
+        """Start the networks, or correct them by the view cell of a recognised place, and record them at this keyframe.
 
         They start with the first keyframe at which the memory could recognise a place. A recognised place then injects the pose
         that the networks had when its view cell was made, moved by where the keyframe lies from there.
@@ -134,7 +134,7 @@ class Mapper:
             self._neural_at.append(self._neural)
 
     def _reckoned_states(self) -> list[NeuralPose]:
-        """The networks at every keyframe so far, from dead reckoning alone."""
+        """States of the networks at every keyframe so far, as they follow from dead reckoning alone."""
         poses = se2.integrate(np.zeros(3), np.stack(self._motions))
         return [networks.begin(pose, self._since_keyframe.spacing, self._config.attractor) for pose in poses]
 

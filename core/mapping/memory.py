@@ -1,6 +1,6 @@
 """Memory of places while mapping: is the place of a keyframe one seen before?
 
-Stored views are the nodes of a graph, whose links are the ways driven between them. A keyframe's view is scored against all
+Stored views are the nodes of a graph, whose links are the paths driven between them. A keyframe's view is scored against all
 stored ones and the scores are filtered along the graph (``views.sequence``). Where a place stands out far enough, the keyframe
 shares its view cell in place of storing its own view.
 
@@ -101,18 +101,20 @@ class PlaceMemory:
     def recognise(
         self, vertex: int, descriptor: Descriptor, travelled: float, turned_rad: float, spacing: float
     ) -> list[Recognition]:
-        """What places the view of a new keyframe recognises; the keyframe's view is then pending.
+        """Recognise the place of a new keyframe, and of pending ones before it, if they were seen before.
+
+        The view of the keyframe is pending afterwards: it is stored only some keyframes later.
 
         Args:
             vertex: number of the keyframe's vertex; numbers count up.
             descriptor: the keyframe's view, (D,).
-            travelled: way since the keyframe before, map units.
+            travelled: distance driven since the keyframe before, map units.
             turned_rad: turn since the keyframe before.
-            spacing: present way between two keyframes, map units.
+            spacing: present distance between two keyframes on a straight road, map units.
 
         Returns:
-            The recognitions that this view triggers, in the order of the vertices: pending keyframes on the path that led here,
-            and last this keyframe itself. Empty where its place is new, or not certain yet.
+            The recognitions that this view triggers, in the order of the vertices: those of pending keyframes on the path that
+            led here, and last that of this keyframe itself. Empty where its place is new, or not certain yet.
         """
         self._query_mean = update_query_mean(self._query_mean, descriptor, self._config.view_cells)
         scores = score(self._views.bank, descriptor, self._query_mean, self._config.view_cells)
@@ -125,7 +127,7 @@ class PlaceMemory:
         return found
 
     def finish(self, spacing: float) -> ViewCells:
-        """Store what is still pending; the view cells of the finished map."""
+        """Store the views that are still pending; returns the view cells of the finished map."""
         while self._pending:
             self._store_oldest(spacing)
         return self._views.finished()
@@ -139,7 +141,7 @@ class PlaceMemory:
         return filter_step(before, z, self._graph.links, travelled, turned_rad, spacing, sequence)
 
     def _needed_margin(self, best: Peak) -> float:
-        """The margin that the best cell needs: less where the keyframe before was recognised and its cell leads to this one."""
+        """The margin that the best cell needs: less where the keyframe before was recognised and its cell leads to the best."""
         latest = self._pending[-1]
         came_from = latest.evidence.predecessor[best.cell] if best.cell >= 0 else -1
         continues = came_from >= 0 and len(self._pending) > 1 and self._pending[-2].cell == came_from
@@ -148,7 +150,8 @@ class PlaceMemory:
     def _trace_back(self, best: Peak) -> list[Recognition]:
         """Recognise the latest view as the best cell, and the pending views before it as the cells on the path that led there.
 
-        The path ends at a view that was recognised before, or whose own z-score does not support the cell.
+        The path ends at a view that was recognised before, or whose own z-score does not support the cell. The cells are noted in
+        the pending views.
         """
         found, cell = [], best.cell
         for view in reversed(self._pending):
@@ -161,7 +164,11 @@ class PlaceMemory:
         return found[::-1]
 
     def _recognition(self, view: _PendingView, margin: float) -> Recognition:
-        """The recognition of a view as its cell; a view that looks further right than the cell has its heading to the right."""
+        """The recognition of a view as its cell, with where it was taken relative to the cell's view.
+
+        The sideways shift at which the two agree best gives the heading: a view that looks further right has its heading to the
+        right.
+        """
         shift = peak_shift(view.scores[view.cell])
         along = self._along(view)
         return Recognition(view.vertex, view.cell, margin, along, -shift * self._config.column_rad)

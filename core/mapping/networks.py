@@ -53,7 +53,7 @@ class NeuralPose:
 
 
 def begin(pose: FloatArray, spacing: float, config: MapperAttractorConfig) -> NeuralPose:
-    """Networks that know their pose (3,); ``spacing`` is the typical way between keyframes, map units."""
+    """Start the networks at a known pose (3,); ``spacing`` is the typical distance between keyframes, map units."""
     period = grid_cells.module_periods(config.period_spacings * spacing)
     head = head_direction.known(float(pose[2]), config.head)
     return NeuralPose(head, grid_cells.known(pose[:2], period, config.grid), np.tile(pose[:2], (2, 1)))
@@ -72,7 +72,11 @@ def path_integrate(state: NeuralPose, motion: FloatArray, dt_s: float, config: M
 
 
 def inject(state: NeuralPose, pose: FloatArray, config: MapperAttractorConfig) -> NeuralPose:
-    """A recognised view cell speaks for a pose (3,): Eqs. (13)-(14), Li et al. 2025, in both networks."""
+    """Inject the pose (3,) that a recognised view cell stands for into both networks, Eqs. (13)-(14), Li et al. 2025.
+
+    Its reliability is ``injection_share`` of the information E. For the position it is converted to 1/length^2, which is the same
+    share of E on every torus.
+    """
     head = head_direction.inject(state.head, float(pose[2]), config.injection_share * config.head.information, config.head)
     per_length = 2.0 * np.pi / state.grid.period[0]
     strength = np.full(2, config.injection_share * config.grid.information * per_length**2)
@@ -82,7 +86,7 @@ def inject(state: NeuralPose, pose: FloatArray, config: MapperAttractorConfig) -
 
 
 def recorded(states: list[NeuralPose]) -> AttractorStates:
-    """The states of the networks at V vertices as the map stores them."""
+    """Stack the states of the networks at V vertices into the arrays that the map stores."""
     count = len(states)
     modules = len(states[0].grid.period) if states else 0
     return AttractorStates(
@@ -101,5 +105,5 @@ def _rotated(heading_rad: FloatArray, motion: FloatArray) -> FloatArray:
 
 
 def _stacked(rows: list[FloatArray], shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.float32]]:
-    """The rows as one array of the given shape, which an empty list does not tell."""
+    """The rows as one array of the given shape, which has to be given because an empty list of rows has none."""
     return np.array(rows, dtype=np.float32).reshape(shape)

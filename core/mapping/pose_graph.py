@@ -54,7 +54,10 @@ def relax_pose_graph(poses: FloatArray, edges: Edges, config: PoseGraphConfig) -
 
 
 def edge_weights(poses: FloatArray, edges: Edges, sq_width: float) -> FloatArray:
-    """Weight (E,) of each edge at ``poses``: Geman-McClure with a squared width in sigmas for closures, 1 for odometry."""
+    """Weight (E,) of each edge at ``poses``: that of the Geman-McClure loss for closures, 1 for odometry.
+
+    ``sq_width`` is the square of the error, in sigmas, at which the weight has fallen to a quarter.
+    """
     weight = geman_mcclure_weight(_sq_error(poses, edges), sq_width)
     return np.where(edges.kind == EdgeKind.CLOSURE, weight, 1.0)
 

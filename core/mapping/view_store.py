@@ -16,7 +16,7 @@ FIRST_ROOM = 64  # templates that there is room for at first; the room doubles w
 class ViewStore:
     """Stored templates in one block, which doubles when full, and the ``bank`` to score queries against.
 
-    The mean that scoring subtracts changes with every view. Renewing it means new lengths for all templates, so that it is
+    The mean that scoring subtracts changes with every view. Renewing it changes the norms of all templates, so that it is
     renewed only when the number of templates has grown by a quarter since the last time: a constant cost per view on average.
     """
 
@@ -28,7 +28,7 @@ class ViewStore:
         self.bank = make_bank(config.kind, config.shape, self._templates[:0], no_mean)
 
     def append(self, descriptor: Descriptor) -> None:
-        """One more view (D,)."""
+        """Store one more view (D,), and bring the bank up to date."""
         if self._count == len(self._templates):
             self._templates = np.concatenate([self._templates, np.zeros_like(self._templates)])
         self._templates[self._count] = descriptor
@@ -43,6 +43,6 @@ class ViewStore:
         self.bank = ViewCellBank(kind, shape, stored, self.bank.mean, inverse_norm)
 
     def finished(self) -> ViewCells:
-        """The view cells of the finished map, with the mean of all of them."""
+        """The stored views as the view cells of the finished map, with the mean of all of them."""
         kind, templates = self._config.kind, self.bank.templates
         return ViewCells(kind, templates.copy(), template_mean(kind, templates), self._config.shape)

@@ -30,10 +30,10 @@ class ConfidenceConfig:
 
 
 def distant_gap(points_m: FloatArray, alternatives: RouteAlternatives, distant_m: float) -> FloatArray:
-    """By how many nats (T,) the best complete route leads the best one that is at another place at that sample.
+    """Lead in nats (T,), at each sample, of the best complete route over the best one that is at another place there.
 
-    The gap is between complete routes, so that evidence from before and after the sample counts. Where the search's margin holds
-    no alternative at another place, the gap is at least that margin and returned as inf.
+    The gap is between complete routes, so that evidence from before and after the sample counts. If the search kept no
+    alternative at another place, the lead is at least the search's margin and is returned as inf.
 
     Args:
         points_m: (T, 2) the best route.
@@ -43,7 +43,7 @@ def distant_gap(points_m: FloatArray, alternatives: RouteAlternatives, distant_m
     rows = np.diff(alternatives.row_start)
     away = alternatives.points_m - np.repeat(points_m, rows, axis=0).astype(np.float32)
     distant = np.where(np.sum(away**2, axis=1) > distant_m**2, alternatives.through_nats, -np.inf)
-    best = np.max(alternatives.through_nats[alternatives.row_start[-2] :])
+    best = np.max(alternatives.through_nats[alternatives.row_start[-2] :])  # the best route passes through every sample
     rival = np.maximum.reduceat(distant, alternatives.row_start[:-1])
     gap: FloatArray = np.where(rival > -1e29, best - rival, np.inf)
     return gap
@@ -106,7 +106,7 @@ CAUSES = {
 
 
 def match_breaks(status: UInt8Array) -> tuple[MatchBreak, ...]:
-    """Runs of unmatched vertices with the same status, from the status (V,) of each vertex."""
+    """One break for each run of unmatched vertices with the same status, from the MatchStatus (V,) of each vertex."""
     edges = np.flatnonzero(np.diff(status.astype(np.int16))) + 1
     starts, ends = np.concatenate([[0], edges]), np.concatenate([edges, [len(status)]])
     return tuple(

@@ -32,7 +32,7 @@ def on_parallel_lanes(line: RouteLine, network: RoadNetwork) -> BoolArray:
 
 
 def near_lane_changes(line: RouteLine, network: RoadNetwork) -> BoolArray:
-    """Which samples (P,) of the line lie within ``LANE_CHANGE_M`` of a lane change."""
+    """Which samples (P,) of the line lie within ``LANE_CHANGE_M`` of a lane change, where either lane may be the driven one."""
     before, after = line.lane[:-1], line.lane[1:]
     changes_m = line.arc_m[:-1][network.are_adjacent(before, after) & (before != after)]
     if len(changes_m) == 0:
@@ -44,15 +44,15 @@ def near_lane_changes(line: RouteLine, network: RoadNetwork) -> BoolArray:
 
 
 def unknown_lane_sigma_m(line: RouteLine, arc_m: FloatArray, lane_unknown: BoolArray) -> FloatArray:
-    """Lateral sigma (S,) that the choice of the lane adds at places on the line.
+    """Lateral sigma (S,) in metres that is added where it is uncertain which of several parallel lanes was driven.
 
     Args:
         line: the route's line of P samples.
-        arc_m: (S,) arc lengths of the places.
+        arc_m: (S,) arc lengths on the line for which the sigma is wanted.
         lane_unknown: (P,) samples whose lane may be the wrong one of several.
 
     Returns:
-        ``UNKNOWN_LANE_SIGMA_M`` where the lane of the next sample is unknown, else 0.
+        ``UNKNOWN_LANE_SIGMA_M`` where the lane of the next sample of the line is uncertain, else 0.
     """
     sample = np.clip(np.searchsorted(line.arc_m, arc_m), 0, len(line.arc_m) - 1)
     sigma: FloatArray = np.where(lane_unknown[sample], UNKNOWN_LANE_SIGMA_M, 0.0)
@@ -60,11 +60,11 @@ def unknown_lane_sigma_m(line: RouteLine, arc_m: FloatArray, lane_unknown: BoolA
 
 
 def choose_lanes(poses: FloatArray, matched: BoolArray, network: RoadNetwork, config: RouteSearchConfig) -> Route:
-    """The route searched anew along metric poses.
+    """Search the route once more, along metric poses, whose lateral positions decide between parallel lanes.
 
     Args:
         poses: (S, 3) in the network frame; the search begins near the first.
-        matched: (S,) poses that also say where the route is.
+        matched: (S,) whether a pose also constrains the place of the route; the others contribute their motion only.
         network: the roads.
         config: states, bounds and costs of the search.
     """

@@ -15,7 +15,7 @@ from hippodrome.core.types import FloatArray, IntArray
 
 SPACING_M = 0.5  # spacing of the line's samples: a polyline's chord over 0.5 m is within a millimetre of any drivable curve
 _CHORD_SAMPLES = 3  # headings are taken over 1.5 m either way, as in the lane graph
-_BACK_M = 1.5  # positions may step back by rounding; farther back on the same lane means that a loop was driven
+_BACK_M = 1.5  # positions may step back this much by rounding; farther back on the same lane means that a loop was driven
 
 
 class Leg(NamedTuple):
@@ -70,7 +70,7 @@ def route_line(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArra
 
 
 def _legs(route: Route, network: RoadNetwork) -> tuple[list[Leg], FloatArray]:
-    """The legs driven one after the other, and the arc length (T,) at each sample of the route."""
+    """The legs of the route in driving order, and the arc length (T,) on the line at each sample of the route."""
     lengths = network.lane_lengths_m()
     legs: list[Leg] = []
     done, sample_arc = 0.0, np.zeros(len(route.lane))
@@ -102,9 +102,10 @@ def _step_legs(route: Route, network: RoadNetwork, lengths_m: FloatArray, t: int
 def _passages(
     network: RoadNetwork, lengths_m: FloatArray, start: tuple[int, float], end: tuple[int, float], driven_m: float
 ) -> list[_Passage]:
-    """The passages on the way from one (lane, arc length) to another: of all ways the one whose length is nearest to driven.
+    """Find the passages from lane to lane on the path between two positions (lane, arc length).
 
-    As in the lane graph, a lane change is possible at the beginning only. The ways are walked depth-first.
+    Several paths may connect the two; the one whose length is nearest to ``driven_m`` is returned. As in the lane graph, a lane
+    change is possible at the beginning only. All paths up to about 1.5 times ``driven_m`` are searched depth-first.
     """
     open_ = _first_lanes(network, lengths_m, *start)
     best: list[_Passage] = []
@@ -123,7 +124,7 @@ def _passages(
 
 
 def _first_lanes(network: RoadNetwork, lengths_m: FloatArray, lane: int, position_m: float) -> list[_OpenLane]:
-    """The lane on which a way begins, and those that a lane change leads to at once."""
+    """The lane on which a path begins, and the adjacent lanes that a lane change at once leads to."""
     open_ = [_OpenLane(lane, -position_m, [])]
     for side in network.adjacent_lanes(lane):
         entered_at_m = entry_position_m(position_m, lengths_m[lane], lengths_m[side])

@@ -23,7 +23,7 @@ from hippodrome.core.roads.geometry import RoadGeometry, poses_on_segments
 from hippodrome.core.types import FloatArray, IntArray, StartPose
 
 _ROAD_SPACING_M = 2.0  # spacing of the road samples: small against the truncation
-_STEP_SHARE = 0.05  # prior sigma of an ICP step in a and b, as a share of the scale: how far it goes along what roads leave open
+_STEP_SHARE = 0.05  # sigma of an ICP step in a and b, as a share of the scale: it limits what the roads leave undetermined
 _STEP_M = 30.0  # the same in translation
 _OTHER_SCALE = 0.03  # relative difference in scale from which an alignment counts as another one
 _OTHER_TURN_RAD = 0.05  # difference in rotation from which it does
@@ -121,9 +121,9 @@ def _moved(hypotheses: FloatArray, poses: FloatArray) -> FloatArray:
 
 
 def _nearest(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: AlignmentConfig) -> tuple[FloatArray, IntArray]:
-    """Distance (H, N) of each pose in position and heading to the nearest road sample, and the sample's number.
+    """Distance (H, N) of each pose to the nearest road sample, position and heading together, and the index of that sample.
 
-    Beyond the truncation the distance is infinite, and the number that of no sample.
+    Without a sample within ``truncation_m`` the distance is infinite, and the index is one past the last sample.
     """
     lifted = _lifted(_moved(hypotheses, poses), config.heading_lever_m)
     distance, sample = roads.tree.query(lifted, distance_upper_bound=config.truncation_m)
@@ -132,11 +132,11 @@ def _nearest(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: A
 
 
 def _costs(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: AlignmentConfig) -> FloatArray:
-    """Cost (H,) of each hypothesis: mean truncated distance over the truncation, over the root of the scale.
+    """Cost (H,) of each hypothesis: its mean truncated distance as a share of the truncation, divided by the root of the scale.
 
-    Measured in metres of the network, a map shrunk into one junction would fit best; measured in units of the map, one blown up
-    would. Division by the root of the scale is half-way between both frames, where neither pays. Infinite for hypotheses outside
-    the limits of scale or misfit.
+    If distances were measured in metres, a map shrunk into one junction would fit best; in map units, one blown up would.
+    Division by the root of the scale lies half-way between the two and favours neither. Hypotheses outside the limits of scale or
+    misfit cost infinity.
     """
     distance, _ = _nearest(hypotheses, poses, roads, config)
     scale = np.hypot(hypotheses[:, 0], hypotheses[:, 1])
@@ -151,7 +151,7 @@ def _icp_step(
     """Every hypothesis (H, 4) after one trimmed point-to-line step of ICP: a linear least squares problem in (a, b, x, y).
 
     Its terms: the distance of every used pose from the line of its nearest road sample (``road_sigma_m``), of the first vertex
-    from the start pose, and of the new hypothesis from the old, so that it does not run away along what the roads leave open.
+    from the start pose, and of the new hypothesis from the old, so that it stays put where the roads leave it free.
     """
     distance, sample = _nearest(hypotheses, poses, roads, config)
     trim = np.quantile(distance, config.trimmed_share, axis=1, method="higher")
@@ -177,7 +177,10 @@ def _rows(normal: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _distinct(hypotheses: FloatArray, costs: FloatArray, config: AlignmentConfig) -> FloatArray:
-    """The hypotheses by rising cost, of those that ICP has brought together only the cheapest one."""
+    """Sort the hypotheses by cost, and keep only the cheapest of those that ICP has brought together.
+
+    Two of them count as one if their scales and their rotations are equal when rounded to half a step of the first scan.
+    """
     order = np.argsort(costs, kind="stable")
     log_scale = np.log(np.hypot(hypotheses[order, 0], hypotheses[order, 1]))
     cell = np.column_stack([log_scale / config.scale_step, _rotation(hypotheses[order]) / config.turn_step_rad])
@@ -191,7 +194,7 @@ def _rotation(hypotheses: FloatArray) -> FloatArray:
 
 
 def _answer(hypotheses: FloatArray, costs: FloatArray) -> Alignment:
-    """The cheapest hypothesis as a similarity, its cost, and that of the cheapest one that counts as another."""
+    """The cheapest hypothesis as a similarity, its cost, and the cost of the cheapest one with another scale or rotation."""
     order = np.argsort(costs, kind="stable")
     best, scale, rotation = order[0], np.hypot(hypotheses[:, 0], hypotheses[:, 1]), _rotation(hypotheses)
     turn = np.abs(se2.wrap(rotation - rotation[best]))

@@ -56,13 +56,13 @@ class Noise:
 def variance_factors(residual: FloatArray, count: float, freedom_used: FloatArray) -> FloatArray:
     """Factors (M,) by which the variances behind whitened residuals should change: sum r^2 / (count - freedom used).
 
-    Helmert's variance component estimation: a solution uses up tr(J Sigma J^T) of the ``count`` degrees of freedom. Its fixed
-    point is that of expectation maximisation (for Student-t: Lange, Little, Taylor 1989), but it gets there in a few rounds. The
-    number of residuals counts, not the sum of their weights: a weight above 1 adds no freedom.
+    This is Helmert's variance component estimation: the solution uses up tr(J Sigma J^T) of the ``count`` degrees of freedom. It
+    has the same fixed point as expectation maximisation (for Student-t: Lange, Little, Taylor 1989), but gets there in a few
+    rounds. Residuals are counted, and their robust weights not summed, because a weight above 1 adds no freedom.
 
     Args:
         residual: whitened and robustly weighted, (N, M).
-        count: number of residuals that say something.
+        count: number of residuals, without those that have next to no weight.
         freedom_used: tr(J Sigma J^T) per component, (M,).
 
     Returns:

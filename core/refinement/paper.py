@@ -153,7 +153,11 @@ def _edges_within(edges: Edges, begin: int, end: int) -> Edges:
 
 
 def without_closures(cognitive_map: CognitiveMap) -> CognitiveMap:
-    """The same drive by dead reckoning, for maps that false closures which agree with one another have ruined."""
+    """The map with dead-reckoned poses and without its closures.
+
+    It is tried for maps that false closures have ruined: where these agree with one another, no test of single closures finds
+    them.
+    """
     edges, visits = cognitive_map.edges, cognitive_map.visits
     kept = edges.kind == EdgeKind.ODOMETRY
     poses = cognitive_map.poses.copy()

@@ -20,8 +20,8 @@ from hippodrome.core.solvers.chain import ChainSystem
 from hippodrome.core.solvers.robust import geman_mcclure_weight, student_weight
 from hippodrome.core.types import Edges, FloatArray, Visits
 
-GAIN_SIGMA = 0.05  # prior of the gyro's gain error: cheap gyros are calibrated to a few percent
-BIAS_SIGMA_RADPS = 0.02  # prior of the gyro's bias: about 1 deg/s
+GAIN_SIGMA = 0.05  # prior sigma of the gyro's gain error: cheap gyros are calibrated to a few percent
+BIAS_SIGMA_RADPS = 0.02  # prior sigma of the gyro's bias: about 1 deg/s
 GEMAN_MCCLURE = 3.0  # error of a closure in sigmas at which it has lost three quarters of its weight
 
 
@@ -86,21 +86,23 @@ def all_factors(
 
 
 def odometry_factors(state: State, visits: Visits, noise: Noise, scale_step_variance: FloatArray) -> BinaryFactors:
-    """Odometry from each keyframe i to the next (N = S - 1): along, across, heading, log scale.
+    """Odometry from each keyframe i to the next (N = S - 1): residuals along, across, in heading and in log scale.
 
-        r_i = Sigma_i^(-1/2) (R_i^T (p_{i+1} - p_i) - e^{s_i} m_i,  warp(psi_{i+1} - psi_i - (1 + g) w_i - b dt_i),  s_{i+1} -
-        s_i)
+        r_i = Sigma_i^(-1/2) (R_i^T (p_{i+1} - p_i) - e^{s_i} m_i,
+                              warp(psi_{i+1} - psi_i - (1 + g) w_i - b dt_i),
+                              s_{i+1} - s_i)
 
-    m_i (map units) and w_i (rad) are the raw motion. Only the steps of the scale are Student-t, as the scale may jump. Gyros and
-    wheels have no outliers: where a turn is drawn otherwise than driven, it is the road that is wrong.
+    m_i (map units) and w_i (rad) are the raw motion and turn, dt_i (s) the time between the keyframes. Only the steps of the log
+    scale have a Student-t weight, as the scale may jump. Gyros and wheels have no outliers: where the road disagrees with a
+    measured turn, it is the road that is drawn wrong, and its factors are robust.
 
     Args:
         state: where the factors are linearised.
         visits: raw motions of the S keyframes.
         noise: standard deviations.
-        scale_step_variance: what the data leave open about each step of the log scale, as a variance (N,). The robust weight
-            takes the *expected* squared step, to which this is added: a step that nothing tells about looks small without being
-            so.
+        scale_step_variance: (N,) variance that is left of each step of the log scale once the data are known. The robust weight
+            takes the expected squared step, which is the squared estimate plus this variance: the estimate alone looks small
+            where no data determine the step.
     """
     a, b = state.poses[:-1], state.poses[1:]
     motion, dt = visits.motion[1:], np.diff(visits.t_s)
@@ -206,7 +208,7 @@ def stepped(state: State, step: FloatArray, gyro_step: FloatArray) -> State:
 
 
 def _normal_blocks(jacobian: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """J^T J (N, 4, 4) and -J^T r (N, 4) of each factor by itself."""
+    """Contribution of each factor to the normal equations: J^T J (N, 4, 4) and -J^T r (N, 4)."""
     return np.einsum("nmi,nmj->nij", jacobian, jacobian), -np.einsum("nmi,nm->ni", jacobian, residual)
 
 

@@ -128,7 +128,10 @@ def gauss_newton_step(
 
 
 def _closure_coupling(factors: BinaryFactors, closures: Edges) -> Callable[[FloatArray], FloatArray]:
-    """The product x -> K x (S, 4), K being the blocks J_a^T J_b and J_b^T J_a of closures a-b, which lie off the chain."""
+    """The product x -> K x (S, 4) by which ``chain.solve_coupled`` takes the closures into account.
+
+    K consists of the blocks J_a^T J_b and J_b^T J_a of each closure from a to b, which lie off the block-tridiagonal chain.
+    """
     cross = np.einsum("nmi,nmj->nij", factors.source, factors.target)
 
     def couple(x: FloatArray) -> FloatArray:

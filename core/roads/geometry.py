@@ -57,10 +57,10 @@ class Projections:
 
 
 def road_geometry(network: RoadNetwork) -> RoadGeometry:
-    """The network laid out for ``poses_on_segments`` and ``project``; make it once for each network."""
+    """Cut the network into segments with a spatial index, for ``poses_on_segments`` and ``project``; once for each network."""
     step = np.diff(network.points_m, axis=0)
     inside_lane = np.ones(len(step), dtype=bool)
-    inside_lane[network.point_start[1:-1] - 1] = False
+    inside_lane[network.point_start[1:-1] - 1] = False  # from the last point of a lane to the first of the next is no segment
     lane = np.repeat(np.arange(network.lane_count), np.diff(network.point_start))[:-1][inside_lane].astype(np.int32)
     step, begin = step[inside_lane], network.points_m[:-1][inside_lane]
     length = np.linalg.norm(step, axis=1)
@@ -171,7 +171,10 @@ def project(geometry: RoadGeometry, points_m: FloatArray, radius_m: float) -> Pr
 
 
 def _samples(begin: FloatArray, step: FloatArray, length: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Each segment in equal pieces of at most SAMPLE_SPACING_M: the segment (K,) of each piece, and its middle (K, 2)."""
+    """Points for the spatial index: the middles (K, 2) of equal pieces of each segment, at most SAMPLE_SPACING_M long.
+
+    Returns the segment (K,) of each piece, and the middles.
+    """
     pieces = np.maximum(1, np.ceil(length / SAMPLE_SPACING_M).astype(np.int32))
     segment, number = number_pieces(pieces)
     share = (number + 0.5) / pieces[segment]

@@ -82,7 +82,10 @@ def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 
 
 
 def reversed_network(network: RoadNetwork) -> RoadNetwork:
-    """The same lanes under the same indices, driven backwards: for a search that runs back in time."""
+    """The same lanes under the same indices, driven backwards: for a search that runs back in time.
+
+    Centrelines run the other way, and predecessors become successors.
+    """
     predecessor = np.repeat(np.arange(network.lane_count, dtype=np.int32), np.diff(network.successor_start))
     order = np.lexsort((predecessor, network.successor))
     starts, ends = network.point_start[:-1], network.point_start[1:]
@@ -117,7 +120,10 @@ class BinGrid(NamedTuple):
 
 
 def bin_grid(graph: LaneGraph, cell_m: float = 10.0) -> BinGrid:
-    """Spatial index of the bins; a cell of about the radius of a search makes the search read some 9 cells."""
+    """Sort the bins into square cells, as a spatial index.
+
+    If ``cell_m`` is about the radius of a search, the search reads about 9 cells.
+    """
     low = graph.points_m.min(axis=0)
     cell = ((graph.points_m - low) / cell_m).astype(np.int64)
     columns, rows = (int(n) + 1 for n in cell.max(axis=0))
@@ -232,4 +238,5 @@ def _reach_table(bins: _Bins, lanes: _Lanes, limit_m: float) -> _ReachTable:
 
 @njit(cache=True)
 def _room_for(rows: int) -> _Ahead:
+    """A table of so many rows, not filled in yet."""
     return _Ahead(np.empty(rows, np.int32), np.empty(rows, np.float32), np.empty(rows, np.uint8))

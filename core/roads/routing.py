@@ -176,7 +176,10 @@ def _pair_distances(first: NDArray[np.int64], candidates: _Candidates, drives: _
 
 @njit(cache=True)
 def _driving_distance(i: int, j: int, candidates: _Candidates, drives: _Drives) -> float:
-    """Metres from candidate ``i`` to candidate ``j``: along the same carriageway, or over the shortest drive in between."""
+    """Metres from candidate ``i`` to candidate ``j``: along the same carriageway, or over the shortest drive in between.
+
+    Infinite where no drive is within the bound.
+    """
     source, target = candidates.carriageway[i], candidates.carriageway[j]
     forward = (candidates.share[j] - candidates.share[i]) * drives.length_m[source]
     if source == target and forward >= -BACKWARD_SLACK_M:

@@ -90,7 +90,7 @@ def marginals(factor: ChainFactor) -> tuple[FloatArray, FloatArray]:
 
 
 def multiply(system: ChainSystem, x: FloatArray, x_border: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A times a vector of blocks (V, B) and border (G,), in the same two parts."""
+    """The product of the matrix A and a vector of blocks ``x`` (V, B) and border ``x_border`` (G,), in the same two parts."""
     product = np.einsum("vbc,vc->vb", system.diagonal, x) + system.border @ x_border
     product[:-1] += np.einsum("vbc,vc->vb", system.upper, x[1:])
     product[1:] += np.einsum("vcb,vc->vb", system.upper, x[:-1])

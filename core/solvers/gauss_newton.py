@@ -83,7 +83,7 @@ def block_jacobian(blocks: list[tuple[FloatArray, IntArray]], state_size: int) -
 
 
 def _normal_matrix(jacobian: csr_array, damping: float) -> csc_array:
-    """J^T J + damping I."""
+    """The matrix J^T J + damping I of the normal equations."""
     normal = csc_array(jacobian.T @ jacobian)
     return normal if damping == 0.0 else csc_array(normal + damping * identity(normal.shape[0], format="csc"))
 
@@ -91,9 +91,9 @@ def _normal_matrix(jacobian: csr_array, damping: float) -> csc_array:
 def _accept(
     linearise: Linearise, state: FloatArray, residual: FloatArray, jacobian: csr_array, step: FloatArray
 ) -> tuple[FloatArray, FloatArray, csr_array, float]:
-    """The state after the longest halving of ``step`` that does not raise the cost, with its residual, Jacobian and cost.
+    """Take the step, halved as often as is needed for the cost not to rise: the state with its residual, Jacobian and cost.
 
-    Where even the shortest raises it, everything stays as it was.
+    If even the shortest step raises the cost, everything stays as it was.
     """
     cost = _cost(residual)
     for halving in range(HALVINGS + 1):

@@ -37,10 +37,11 @@ def local_residual(
 ) -> tuple[FloatArray, csr_array]:
     """Eq. (11), Li et al. 2025: r_ab = Sigma^(-1/2) (R_a^T (p_b - p_a) - p_ab, warp(psi_b - psi_a - psi_ab)).
 
-    Sigma is diagonal, so that the Mahalanobis norm of the paper is the plain norm of this quotient.
+    It is the error of each edge, pose b as seen from pose a minus what was measured, over its standard deviations. Sigma is
+    diagonal, so that the Mahalanobis norm of the paper is the plain norm of this quotient.
 
     Args:
-        poses: (V, 3).
+        poses: (V, 3), in the unit of ``motion``.
         source: vertex a of each edge, (E,).
         target: vertex b of each edge, (E,).
         motion: measured (p_ab, psi_ab), b seen from a: along, across, heading, (E, 3).

@@ -63,7 +63,7 @@ class ViewCellConfig:
 
     @property
     def max_shift(self) -> int:
-        """Columns of ``shape`` by which two templates may differ sideways."""
+        """Largest sideways shift, in columns of ``shape``, that is tried when two templates are compared."""
         return self.grey_shift if self.kind == "grey" else self.gradient_shift
 
 
@@ -99,7 +99,7 @@ def _orientation_histogram(dx: NDArray[Any], dy: NDArray[Any], cell_px: int, bin
             magnitude = np.sqrt(gx * gx + gy * gy)
             if magnitude == 0.0:
                 continue
-            position = (np.arctan2(gy, gx) + np.pi) * bins_per_rad  # 0 to 2 bins: both directions of a line, taken modulo bins
+            position = (np.arctan2(gy, gx) + np.pi) * bins_per_rad  # from 0 to 2 * bins; modulo bins, opposite directions are one
             low = int(position)
             share = np.float32(position - low)
             cell = histogram[y // cell_px, x // cell_px]
@@ -128,7 +128,7 @@ def _normalise_blocks(histogram: Float32Array, contrast_floor: np.float32) -> In
 
 @njit(cache=True)
 def _cell_energies(histogram: Float32Array) -> Float32Array:
-    """Squared length of each cell's histogram, (rows, columns)."""
+    """Gradient energy of each cell, (rows, columns): the squared length of its histogram."""
     rows, columns, bins = histogram.shape
     energy = np.zeros((rows, columns), dtype=np.float32)
     for y in range(rows):
@@ -140,7 +140,10 @@ def _cell_energies(histogram: Float32Array) -> Float32Array:
 
 @njit(cache=True)
 def _block_energy(energy: Float32Array, y: int, x: int, floor: np.float32) -> np.float32:
-    """``floor`` plus the energies (rows, columns) of a cell and of its up to eight neighbours."""
+    """Energy of the block around a cell, which normalises its histogram: ``floor`` plus that of the cell and its neighbours.
+
+    ``energy`` (rows, columns) is that of each cell; at the border a block has fewer than eight neighbours.
+    """
     rows, columns = energy.shape
     block = floor
     for v in range(max(0, y - 1), min(rows, y + 2)):

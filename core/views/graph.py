@@ -67,7 +67,7 @@ class CellGraph:
         return self.cell_count - 1
 
     def link(self, source: int, target: int, length: float, turn_rad: float) -> None:
-        """Add the path from ``source`` to ``target`` that was just driven."""
+        """Add the path from ``source`` to ``target`` that was just driven: it becomes the newest link of both cells."""
         if self._link_count == len(self._links.source):
             self._links = _copied_into(_empty_links(len(self._links.last_in), 2 * self._link_count), self.links)
         arrays, new = self._links, self._link_count
@@ -78,7 +78,10 @@ class CellGraph:
         self._link_count += 1
 
     def joins(self, source: int, target: int, length: float, tolerance: float) -> bool:
-        """Whether a path of this length, within ``tolerance``, leads from ``source`` to ``target`` already."""
+        """Whether a path of this length, within ``tolerance``, leads from ``source`` to ``target`` already.
+
+        Such a path need not be added again.
+        """
         paths = walk_back(self.links, target, length + tolerance)
         return bool(np.any((paths.source == source) & (np.abs(paths.length - length) <= tolerance)))
 
@@ -102,13 +105,13 @@ def graph_of(cells: IntArray, lengths: FloatArray, turns_rad: FloatArray, tolera
 
 
 def _empty_links(cells: int, links: int) -> Links:
-    """Arrays with room for so many cells and links, none of them there yet."""
+    """Allocate room for so many cells and links. All indices are -1, which means that there is no link."""
 
-    def none(size: int) -> IntArray:
+    def unset(size: int) -> IntArray:
         return np.full(size, -1, dtype=np.int32)
 
     return Links(
-        none(cells), none(cells), none(links), none(links), none(links), none(links), np.zeros(links), np.zeros(links)
+        unset(cells), unset(cells), unset(links), unset(links), unset(links), unset(links), np.zeros(links), np.zeros(links)
     )  # fmt: skip
 
 
@@ -136,7 +139,7 @@ def _copied_into(larger: Links, links: Links) -> Links:
 
 @njit(cache=True)
 def walk_back(links: Links, start: int, reach: float) -> Paths:
-    """The paths no longer than ``reach`` that lead to ``start``, at most WALK_LIMIT; first that of no length from itself."""
+    """The paths no longer than ``reach`` that lead to ``start``, at most WALK_LIMIT; the first is ``start`` itself, length 0."""
     walk = empty_walk()
     count = walk_back_into(walk, links, start, reach)
     return Paths(walk.source[:count], walk.length[:count], walk.turn_rad[:count])
@@ -144,13 +147,16 @@ def walk_back(links: Links, start: int, reach: float) -> Paths:
 
 @njit(cache=True)
 def empty_walk() -> Paths:
-    """Room for WALK_LIMIT paths."""
+    """Room for WALK_LIMIT paths, which ``walk_back_into`` fills."""
     return Paths(np.empty(WALK_LIMIT, dtype=np.int32), np.empty(WALK_LIMIT), np.empty(WALK_LIMIT))
 
 
 @njit(cache=True)
 def walk_back_into(walk: Paths, links: Links, start: int, reach: float) -> int:
-    """Write the paths of ``walk_back`` into ``walk``, breadth first; returns how many there are."""
+    """Write the paths of ``walk_back`` into ``walk``, breadth first; returns how many there are.
+
+    So ``walk`` can be used for many cells, which saves its allocation for each of them.
+    """
     walk.source[0], walk.length[0], walk.turn_rad[0] = start, 0.0, 0.0
     count, at = 1, 0
     while at < count:
@@ -177,7 +183,10 @@ def _holds(walk: Paths, count: int, cell: int, length: float) -> bool:
 
 @njit(cache=True)
 def neighbourhood(links: Links, start: int, reach: float) -> NDArray[np.bool_]:
-    """Mask (C,) of the cells within ``reach`` of ``start`` along links in either direction."""
+    """Mask (C,) of the cells within ``reach`` of ``start`` along links in either direction, which show about the same place.
+
+    A cell is looked at again whenever a shorter path to it is found.
+    """
     inside = np.zeros(len(links.last_in), dtype=np.bool_)
     distance = np.full(len(links.last_in), np.inf)
     distance[start] = 0.0

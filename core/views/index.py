@@ -114,7 +114,7 @@ def candidates(bank: ViewCellBank, index: ViewIndex, query: Query, views: ViewCe
 
 
 def _best_shift(scores: Float32Array) -> Float32Array:
-    """The largest score (C,) over the shifts of (C, S): shift by shift, which is many times faster than view by view."""
+    """The largest score (C,) over the shifts of (C, S), taken shift by shift: many times faster than view by view."""
     best: Float32Array = reduce(np.maximum, scores.T)
     return best
 
@@ -132,7 +132,10 @@ def _evenly_spread(count: int, wanted: int) -> IntArray:
 
 @njit(cache=True)
 def _sketch_similarity(sketch: Int8Array, queries: NDArray[np.int16]) -> IntArray:
-    """Largest product (C,) of each sketch (C, S) with any of the queries (Q, S), summed as integers: exact in whatever order."""
+    """Similarity (C,) of each sketch (C, S) to a query: the largest dot product with any of its shifted copies (Q, S).
+
+    Integers are summed, so that the result does not depend on the order of summation.
+    """
     count, size = sketch.shape
     best = np.empty(count, dtype=np.int32)
     for i in range(count):

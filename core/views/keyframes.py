@@ -79,7 +79,10 @@ def advance(state: KeyframeState, observation: Observation, config: KeyframeConf
 
 
 def is_due(state: KeyframeState, config: KeyframeConfig) -> bool:
-    """Whether the view has changed enough since the last keyframe for a new one."""
+    """Whether a new keyframe is due: the vehicle has driven ``spacing``, or turned by ``turn_rad``, since the last one.
+
+    None is due before the first motion, as the spacing is unknown until then.
+    """
     if state.spacing == 0.0:
         return False
     nearly = 1.0 - 1e-9  # sums of equal steps must not miss their multiple by rounding

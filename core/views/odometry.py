@@ -154,7 +154,8 @@ def _epipolar_cost(
     """Epipolar error of every turn tried, (K,): the sum over corners of |p . (t x R p')|, each at most ``outlier``.
 
     p and p' are the corner's directions in the first and second frame (axes: ahead, left, up), R the turn, and t how the camera
-    has moved along an arc of ``step_m``; every term is brought to the scale of bearings.
+    has moved along an arc of ``step_m``. Each term is divided by about the length of its gradient, as in Sampson's distance,
+    and so becomes an error of bearings.
     """
     ahead_m, left_m = (part[:, None] for part in _camera_shift(turn_rad, step_m, forward_m))
     cos, sin = np.cos(turn_rad)[:, None], np.sin(turn_rad)[:, None]
@@ -167,7 +168,10 @@ def _epipolar_cost(
 
 
 def _camera_shift(turn_rad: FloatArray, step_m: float, forward_m: float) -> tuple[FloatArray, FloatArray]:
-    """Metres ahead and to the left that a camera ``forward_m`` ahead of the rear axle moves while the axle follows an arc."""
+    """Metres ahead and to the left that a camera ``forward_m`` ahead of the rear axle moves while the axle follows an arc.
+
+    It is given for each of the turns; ``step_m`` is about the length of the arc.
+    """
     ahead_m = step_m * np.cos(0.5 * turn_rad) + forward_m * (np.cos(turn_rad) - 1.0)
     return ahead_m, step_m * np.sin(0.5 * turn_rad) + forward_m * np.sin(turn_rad)
 

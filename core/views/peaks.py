@@ -43,7 +43,7 @@ def peak_of_drops(back: float, ahead: float, drop_back: float, drop_ahead: float
         drop_ahead: how much smaller the value after is than the middle one.
 
     Returns:
-        The offset, in the unit of the distances.
+        The offset, in the unit of the distances; 0 where the parabola has no maximum.
     """
     curvature = (drop_ahead * back + drop_back * ahead) / (back * ahead * (back + ahead))
     if curvature <= 0.0:

@@ -46,7 +46,7 @@ def bank_of(cells: ViewCells) -> ViewCellBank:
 
 
 def make_bank(kind: Kind, shape: tuple[int, ...], templates: Descriptor, mean: Float32Array) -> ViewCellBank:
-    """A bank of templates (C, D) and their common mean (D,), with the lengths that the cosine needs."""
+    """A bank of templates (C, D) and their common mean (D,), with the inverse norms that the cosine needs."""
     inverse = np.ones(len(templates), dtype=np.float32)
     if kind == "gradient":
         norm = np.array([np.linalg.norm(template - mean) for template in templates])
@@ -125,7 +125,10 @@ def shifted_queries(query: Float32Array, shape: tuple[int, ...], max_shift: int)
 
 @njit(cache=True)
 def _dot_products(templates: Descriptor, queries: NDArray[np.int16]) -> Float32Array:
-    """Products (C, S) of int8 templates (C, D) and int16 queries (S, D), summed as integers: exact in whatever order."""
+    """Dot products (C, S) of int8 templates (C, D) and int16 queries (S, D).
+
+    Integers are summed, so that the result does not depend on the order of summation.
+    """
     count, size = templates.shape
     products = np.empty((count, queries.shape[0]), dtype=np.float32)
     for i in range(count):

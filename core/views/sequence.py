@@ -73,7 +73,7 @@ NO_EVIDENCE = Evidence(np.zeros(0, dtype=np.float32), np.zeros(0, dtype=np.float
 
 
 def standardise(similarity: Float32Array, min_cells: int, sigma_floor: float) -> Float32Array:
-    """z-scores (C,) of the similarities; zeros while there are too few for statistics."""
+    """z-scores (C,) of the similarities, by a standard deviation of at least ``sigma_floor``; zeros below ``min_cells`` cells."""
     if len(similarity) < min_cells:
         return np.zeros(len(similarity), dtype=np.float32)
     z: Float32Array = (similarity - similarity.mean()) / np.float32(max(float(similarity.std()), sigma_floor))
@@ -83,7 +83,7 @@ def standardise(similarity: Float32Array, min_cells: int, sigma_floor: float) ->
 def filter_step(
     before: Evidence, z: Float32Array, links: Links, travelled: float, turned_rad: float, spacing: float, config: SequenceConfig
 ) -> Evidence:
-    """Evidence for all C cells of a growing graph, after one view more. See ``_evidence_at`` for the formula.
+    """Evidence for all C cells of a growing graph after one more view. See ``_evidence_at`` for the formula.
 
     Args:
         before: evidence after the view before; cells that were added since had none.
@@ -162,7 +162,10 @@ def _evidence_at(
 
 
 def peak(evidence: Evidence, links: Links, reach: float) -> Peak:
-    """The best cell, and its margin over the best one farther than ``reach`` along the graph (0 when there is none)."""
+    """The cell with the most evidence, and its margin over the best cell elsewhere.
+
+    Elsewhere is farther than ``reach`` along the graph; without such a cell the margin is 0.
+    """
     if len(evidence.filtered) == 0:
         return Peak(-1, 0.0)
     best = int(np.argmax(evidence.filtered))

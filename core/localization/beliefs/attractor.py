@@ -54,7 +54,7 @@ class AttractorBelief:
     joint: tuple[JointEstimate, JointEstimate]  # of integrators and calibration cells; the same while there is no challenger
     challenged: bool
     config: BeliefConfig
-    _incumbent: tuple[FloatArray, FloatArray] = field(init=False, repr=False)  # pose (3,), covariance (4, 4): often asked for
+    _incumbent: tuple[FloatArray, FloatArray] = field(init=False, repr=False)  # cached: pose (3,), covariance (4, 4)
     keeps_challenger: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -62,7 +62,11 @@ class AttractorBelief:
 
     @classmethod
     def uniform(cls, start_m: FloatArray, log_scale: float, config: BeliefConfig) -> Self:
-        """No prior knowledge but the map's scale; ``start_m`` (2,) is only a point from which phases are unwrapped."""
+        """Return a belief that knows nothing but the map's scale.
+
+        A torus repeats its positions. Until a pose is measured, the read-out is the repetition near ``start_m`` (2,), any point
+        of the map.
+        """
         joint = JointEstimate(start_m, log_scale, np.diag([0.0, 0.0, 0.0, config.motion.scale_prior**2]))
         return cls(
             head=head_direction.uniform(config.head),
@@ -74,7 +78,7 @@ class AttractorBelief:
 
     @property
     def pose(self) -> FloatArray:
-        """The read-out (3,) of Eqs. (15)-(16), of the incumbent alone while it is challenged."""
+        """The fused pose (3,) of both populations, Eqs. (15)-(16); while there is a challenger, that of the integrators alone."""
         return self._incumbent[0].copy()
 
     @property
@@ -84,15 +88,19 @@ class AttractorBelief:
 
     @property
     def log_scale(self) -> float:
-        """ln(metres per map unit of this drive), as the incumbent has it."""
+        """ln(metres per map unit of this drive), as the incumbent estimates it."""
         return self.joint[INTEGRATOR].log_scale
 
     def activity(self) -> NetworkActivity:
-        """The two networks as they are."""
+        """State of the head-direction and grid-cell networks, which the estimate reports."""
         return network_activity(self.head, self.grid)
 
     def predict(self, motion: Motion) -> Self:
-        """Path integration, then inhibition. Reliabilities fade by the motion's noise and by the errors that couple into them."""
+        """Path integration in both networks, then inhibition between their populations.
+
+        Reliabilities fall by the noise of the motion, and by the errors of heading and scale that the motion turns into errors of
+        the position.
+        """
         integrator = self._path_integrated(INTEGRATOR, motion)
         calibration = self._path_integrated(CALIBRATION, motion) if self.challenged else integrator
         added = np.stack([integrator.added_variance, calibration.added_variance])
@@ -111,7 +119,11 @@ class AttractorBelief:
         )
 
     def _path_integrated(self, population: int, motion: Motion) -> _PathIntegration:
-        """The motion along the population's own heading, at its own scale, and the variance that it adds."""
+        """Predict one population: its step along its own heading and at its own scale, and the variance that the step adds.
+
+        Without a challenger the added variance may be negative, since driving back undoes what driving on has added; the share
+        ``LEAST_LEFT`` of the variance remains at least.
+        """
         pose, covariance = self._incumbent if population == INTEGRATOR else self._estimate(population)
         joint = self.joint[population]
         heading_rad = float(pose[2])
@@ -129,7 +141,10 @@ class AttractorBelief:
         return float(difference @ np.linalg.solve(covariance[:3, :3] + measurement.covariance, difference))
 
     def inject(self, measurement: PoseMeasurement) -> Self:
-        """A measured pose that agrees with the incumbent: Eqs. (13)-(16) and hand-back in each network."""
+        """Update the incumbent with a measured pose that agrees with it, and dismiss the challenger.
+
+        In each network Eqs. (13)-(14) inject the pose, and both populations then take over the fused belief (hand-back).
+        """
         settled = self._settled_on(INTEGRATOR) if self.challenged else self
         given = settled._injections(INTEGRATOR, measurement)
         head = head_direction.inject(settled.head, float(given.pose[2]), float(given.reliability[2]), self.config.head)
@@ -139,7 +154,10 @@ class AttractorBelief:
         return replace(settled, head=head, grid=grid, joint=(joint, joint))
 
     def reinforce(self, measurement: PoseMeasurement) -> Self:
-        """A measured pose that agrees with the challenger: Eqs. (13)-(14), no hand-back."""
+        """Update the challenger with a measured pose that agrees with it, by Eqs. (13)-(14) on the calibration cells.
+
+        There is no hand-back, so that the integrators keep the incumbent.
+        """
         given = self._injections(CALIBRATION, measurement)
         head = head_direction.stimulate(self.head, float(given.pose[2]), float(given.reliability[2]))
         grid = grid_cells.stimulate(self.grid, given.pose[:2], given.reliability[:2])
@@ -164,7 +182,10 @@ class AttractorBelief:
         return _Injections(pose + offset, (1.0 / left - 1.0) / variance, reached)
 
     def challenge(self, measurement: PoseMeasurement) -> Self:
-        """A measured pose that conflicts: the calibration cells leave for it, with the incumbent's scale."""
+        """Make a measured pose that conflicts with the belief the challenger; the integrators keep the incumbent.
+
+        The calibration cells take over the measured pose with its covariance; the scale of the challenger is the incumbent's.
+        """
         position_m, heading_rad = measurement.pose[:2], float(measurement.pose[2])
         variance, incumbent = np.diag(measurement.covariance), self.joint[INTEGRATOR]
         covariance = np.zeros((4, 4))
@@ -178,11 +199,11 @@ class AttractorBelief:
         )
 
     def adopt(self) -> Self:
-        """The challenger has won: the integrators snap to it, and what was learned about the incumbent's errors is dropped."""
+        """Make the challenger the incumbent: the integrators take over its pose, and the incumbent's covariances are dropped."""
         return self._settled_on(CALIBRATION)
 
     def _settled_on(self, population: int) -> Self:
-        """The conflict is over: both populations hold what this one believes."""
+        """End the conflict between incumbent and challenger: both populations take over the belief of ``population``."""
         return replace(
             self,
             head=head_direction.adopt(self.head, population, self.config.head),
@@ -192,7 +213,10 @@ class AttractorBelief:
         )
 
     def _estimate(self, population: int) -> tuple[FloatArray, FloatArray]:
-        """Pose (3,) and covariance (4, 4): of one population while the two are in conflict, else of both fused."""
+        """Pose (3,) and covariance (4, 4) of one population while there is a challenger, else of both populations fused.
+
+        The variances of the pose come from the reliabilities of the networks, all else in the covariance from ``joint``.
+        """
         joint = self.joint[population]
         if self.challenged:
             heading_rad, r_heading = float(self.head.mean_rad[population]), float(self.head.reliability[population])
@@ -207,17 +231,17 @@ class AttractorBelief:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PathIntegration:
-    """What a motion does to one population."""
+    """The prediction of one population for one motion."""
 
-    step_m: FloatArray  # (2,) displacement
+    step_m: FloatArray  # (2,) displacement, x and y in the network frame
     added_variance: FloatArray  # (3,) of x, y, heading: m^2, m^2, rad^2
-    joint: JointEstimate  # afterwards
+    joint: JointEstimate  # the joint estimate after the motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Injections:
-    """A measured pose as each network gets it."""
+    """What a measured pose injects into each network."""
 
     pose: FloatArray  # (3,) means for the tori and the ring
     reliability: FloatArray  # (3,) 1/m^2, 1/m^2, 1/rad^2
-    joint: JointEstimate  # afterwards
+    joint: JointEstimate  # the joint estimate after the update

@@ -45,16 +45,16 @@ class PoseBelief(Protocol):
 
     @property
     def keeps_challenger(self) -> bool:
-        """Whether the belief is a ``CompetingBelief``."""
+        """Whether the belief is a ``CompetingBelief``, which can hold a challenger beside the incumbent."""
 
     def predict(self, motion: Motion) -> Self:
         """The belief after a motion of the vehicle."""
 
     def inject(self, measurement: PoseMeasurement) -> Self:
-        """The belief after a measured pose. With a challenger it is the incumbent's, and the challenger is dismissed."""
+        """The belief after a measured pose. A belief with a challenger updates its incumbent and dismisses the challenger."""
 
     def activity(self) -> NetworkActivity:
-        """State of the attractor networks."""
+        """State of the attractor networks, which estimates report."""
 
 
 class CompetingBelief(PoseBelief, Protocol):
@@ -62,13 +62,13 @@ class CompetingBelief(PoseBelief, Protocol):
 
     @property
     def challenged(self) -> bool:
-        """Whether there is a challenger."""
+        """Whether there is a challenger at present."""
 
     def sq_distance(self, measurement: PoseMeasurement, challenger: bool = False) -> float:
         """Squared Mahalanobis distance of a measured pose from the incumbent, or from the challenger."""
 
     def challenge(self, measurement: PoseMeasurement) -> Self:
-        """A measured pose that conflicts with all there is becomes the challenger; the incumbent stays."""
+        """The belief after a measured pose that conflicts with it: the pose becomes the challenger, and the incumbent stays."""
 
     def reinforce(self, measurement: PoseMeasurement) -> Self:
         """The challenger after a measured pose that agrees with it; the incumbent stays."""
@@ -78,16 +78,16 @@ class CompetingBelief(PoseBelief, Protocol):
 
 
 def competes(belief: PoseBelief) -> TypeGuard[CompetingBelief]:
-    """Whether the belief is one with a challenger."""
+    """Whether the belief can hold a challenger; to the type checker it is a ``CompetingBelief`` then."""
     return belief.keeps_challenger
 
 
 def network_activity(head: HeadDirectionState, grid: GridState) -> NetworkActivity:
-    """The activity of a belief that is held by networks."""
+    """The activity of a belief that is held by attractor networks: their means and reliabilities."""
     return NetworkActivity(head.mean_rad, head.reliability, grid.mean_rad, grid.reliability)
 
 
 def no_networks(heading_rad: float, sq_heading: float) -> NetworkActivity:
-    """What a belief without networks reports: its heading with variance ``sq_heading``, and no grid modules."""
+    """The activity that a belief without networks reports: its heading, with variance ``sq_heading`` (rad^2), and no grid."""
     none = np.zeros((0, 2, 2))
     return NetworkActivity(np.full(2, heading_rad), np.array([1.0 / sq_heading, 0.0]), none, none)

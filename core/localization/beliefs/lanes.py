@@ -23,12 +23,12 @@ from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import Float32Array, FloatArray, IntArray, UInt8Array
 
 BIN_M = 2.0
-SPREAD_M = 4.0  # the bins are moved whenever this much was driven at the map's scale
-REACH_M = 24.0  # farthest that bins are moved at once: twice SPREAD_M, as the scale may be twice the map's, three times over
+MOVE_M = 4.0  # the probabilities are moved ahead whenever this much was driven at the map's scale
+REACH_M = 24.0  # farthest that they are moved at once: three times the 8 m that MOVE_M means at twice the map's scale
 SCALE_STEP, SCALE_STEPS = 0.06, 21  # ln(scale) runs over two standard deviations of the prior on either side
-CHANGE_SHARE = 0.02  # probability of a lane change while the bins are moved once
-OUTLIER = 0.02  # likelihood of a measured pose at a wrong place, relative to the right one: one in eight names another place
-ANYWHERE = 1e-3  # probability spread over all bins each time, as the vehicle may have been carried anywhere
+CHANGE_SHARE = 0.02  # probability of a lane change in one move
+OUTLIER = 0.02  # least likelihood of a measured pose, relative to the best: one measurement in eight is of another place
+ANYWHERE = 1e-3  # probability spread evenly over all bins in each move, so that no place is ever ruled out for good
 LANE_HEADING_RAD = 0.25  # standard deviation of the vehicle's heading about the chord of its bin: bends and lane changes
 NEAR_M = 15.0  # the read-out is the mean of the bins within this of the likeliest one
 LEAST_MASS = 1e-12  # bins with less probability are not moved
@@ -43,18 +43,18 @@ class _Reach(NamedTuple):
 
     start: Int64Array  # (N + 1,) the bins ahead of bin ``i`` are the rows ``start[i]:start[i + 1]``
     target: IntArray  # (R,) the bin ahead
-    distance_m: Float32Array  # (R,) the way there
+    distance_m: Float32Array  # (R,) distance to it along the lanes
     changes: UInt8Array  # (R,) lane changes on the way, 0 or 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LaneBelief:
-    """Probabilities of bins and scales, and what was driven since the bins were moved; the heading has a filter of its own."""
+    """Probabilities of bins and scales, and the motion since they were last moved; the heading has a filter of its own."""
 
     graph: LaneGraph
     probability: FloatArray  # (S, N) of scales and bins, sums to 1
     log_scales: FloatArray  # (S,)
-    waiting: Motion  # driven since the bins were moved
+    waiting: Motion  # motion since the probabilities were last moved
     heading_rad: float
     sq_heading: float  # variance of the heading, rad^2
     config: BeliefConfig
@@ -62,7 +62,7 @@ class LaneBelief:
 
     @classmethod
     def uniform(cls, network: RoadNetwork, log_scale: float, config: BeliefConfig) -> Self:
-        """Anywhere on the network; the scale is the map's, with the standard deviation of the motion's prior."""
+        """Return a belief that is uniform over the bins, with a Gaussian prior of the log scale about ``log_scale``."""
         graph = build_lane_graph(network, REACH_M, BIN_M)
         offsets: FloatArray = SCALE_STEP * (np.arange(SCALE_STEPS, dtype=np.float64) - SCALE_STEPS // 2)
         prior = np.exp(-0.5 * (offsets / config.motion.scale_prior) ** 2)
@@ -76,7 +76,7 @@ class LaneBelief:
 
     @property
     def pose(self) -> FloatArray:
-        """Pose (3,): the mean around the likeliest bin, moved on by what was driven since."""
+        """Pose (3,): the mean position around the likeliest bin, moved on by the motion in ``waiting``, and the heading."""
         position_m, _ = self._read_out()
         ahead_m = self.waiting.travelled * math.exp(self.log_scale)
         chord_rad = self.heading_rad - 0.5 * self.waiting.turned_rad
@@ -91,7 +91,7 @@ class LaneBelief:
         return covariance
 
     def activity(self) -> NetworkActivity:
-        """The heading alone: a filter has no networks."""
+        """Report the heading only, since a histogram filter has no networks."""
         return no_networks(self.heading_rad, self.sq_heading)
 
     def _read_out(self) -> tuple[FloatArray, FloatArray]:
@@ -104,20 +104,27 @@ class LaneBelief:
         return mean_m, (bins[:, None] * apart_m).T @ apart_m + sq_within * np.eye(2)
 
     def predict(self, motion: Motion) -> Self:
-        """The heading turns at once; the bins are moved when enough was driven."""
+        """Turn the heading at once, but move the probabilities over the bins only when ``MOVE_M`` has been driven.
+
+        Shorter motions are summed up in ``waiting`` until then, because each move blurs the probabilities by half a bin or more.
+        """
         noise, waiting = self.config.motion, self.waiting
         walk = max(noise.gyro_rad_per_sqrt_s, motion.gyro_rad_per_sqrt_s)
         sq_heading = min(SQ_UNKNOWN, self.sq_heading + walk**2 * motion.dt_s + (noise.gyro_gain * motion.turned_rad) ** 2)
         heading_rad = float(wrap_compiled(self.heading_rad + motion.turned_rad))
         waiting = Motion(waiting.travelled + motion.travelled, waiting.turned_rad + motion.turned_rad, waiting.dt_s + motion.dt_s)
         turned = replace(self, waiting=waiting, heading_rad=heading_rad, sq_heading=sq_heading)
-        due = waiting.travelled * math.exp(float(self.log_scales[SCALE_STEPS // 2])) >= SPREAD_M
+        due = waiting.travelled * math.exp(float(self.log_scales[SCALE_STEPS // 2])) >= MOVE_M
         return turned._moved() if due else turned
 
     def _moved(self) -> Self:
-        """The bins moved by what was driven, the scales wandered, and the bins weighted by how well they fit the heading."""
+        """Move the probabilities by the motion in ``waiting``, diffuse the scales, and weight the bins by the heading.
+
+        The log scale walks at random to its two neighbours, as in a diffusion. A bin weighs the more the better its direction
+        fits the heading. ``ANYWHERE`` of the probability is then spread over all bins, or all of it if no bin is left.
+        """
         graph, noise, driven = self.graph, self.config.motion, self.waiting
-        sigma = noise.speed * math.sqrt(max(driven.dt_s, 1e-9)) / max(driven.dt_s, 1e-9)  # relative, of the distance
+        sigma = noise.speed * math.sqrt(max(driven.dt_s, 1e-9)) / max(driven.dt_s, 1e-9)  # relative sigma of the distance
         reach = _Reach(graph.reach_start, graph.reach_bin, graph.reach_m, graph.reach_changes)
         moved = _moved_ahead(self.probability, driven.travelled * np.exp(self.log_scales), sigma, reach)
         share = noise.scale_walk_per_sqrt_m**2 * driven.travelled * math.exp(self.log_scale) / (2.0 * SCALE_STEP**2)
@@ -131,7 +138,7 @@ class LaneBelief:
         return replace(self, probability=kept + (ANYWHERE if total > 0.0 else 1.0) * anywhere, waiting=Motion(0.0, 0.0, 0.0))
 
     def inject(self, measurement: PoseMeasurement) -> Self:
-        """Bayes' rule for bins and scales, a scalar Kalman update for the heading."""
+        """Update by a measured pose: Bayes' rule for bins and scales, a scalar Kalman update for the heading."""
         due = self.waiting.travelled * math.exp(self.log_scale) >= BIN_M
         moved = self._moved() if due else self
         probability = moved.probability * moved._likelihood(measurement)[None, :]
@@ -147,7 +154,7 @@ class LaneBelief:
         )
 
     def _likelihood(self, measurement: PoseMeasurement) -> FloatArray:
-        """Likelihood (N,) of a measured pose at each bin, up to a factor; outliers included."""
+        """Likelihood (N,) of a measured pose at each bin, up to a factor; ``OUTLIER`` is its least value."""
         apart_m = self.graph.points_m - measurement.pose[:2]
         information = np.linalg.inv(measurement.covariance[:2, :2] + BIN_M**2 / 12.0 * np.eye(2))
         sq = np.einsum("ni,ij,nj->n", apart_m, information, apart_m)
@@ -158,16 +165,18 @@ class LaneBelief:
 
 
 def _anywhere(probability: FloatArray) -> FloatArray:
-    """The scales (S, N) as they are believed, the bins all alike."""
+    """Probabilities (S, N) that are uniform over the bins; each scale keeps its own total probability."""
     flat: FloatArray = np.repeat(probability.sum(axis=1, keepdims=True) / probability.shape[1], probability.shape[1], axis=1)
     return flat
 
 
 @njit(cache=True)
 def _moved_ahead(probability: FloatArray, driven_m: FloatArray, sigma: float, reach: _Reach) -> FloatArray:
-    """Probabilities (S, N) after driving ``driven_m`` (S,), whose relative standard deviation is ``sigma``.
+    """Prediction step of the histogram filter: move the probabilities (S scales, N bins) ahead along the lanes.
 
-    Each bin's probability is shared among the bins ahead of it by how well their distances fit; dead ends lose theirs.
+    At each scale the vehicle drove ``driven_m`` (S,), with the relative standard deviation ``sigma``. The probability of a bin is
+    shared among the bins ahead of it by how well their distances fit, times ``CHANGE_SHARE`` after a lane change. A bin with no
+    such bin ahead, as at a dead end, loses its probability.
     """
     moved = np.zeros_like(probability)
     for s in range(probability.shape[0]):
@@ -191,6 +200,6 @@ def _moved_ahead(probability: FloatArray, driven_m: FloatArray, sigma: float, re
 
 @njit(cache=True)
 def _fit(distance_m: float, driven_m: float, spread_m: float) -> float:
-    """Gaussian of the difference, cut off at three standard deviations ``spread_m``."""
+    """Gaussian weight of the difference of two distances, 0 beyond three standard deviations ``spread_m``."""
     off = (distance_m - driven_m) / spread_m
     return math.exp(-0.5 * off * off) if abs(off) < 3.0 else 0.0

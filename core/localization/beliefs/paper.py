@@ -28,7 +28,7 @@ class PaperBelief:
 
     head: HeadDirectionState
     grid: GridState
-    position_m: FloatArray  # (2,) the read-out of the torus, unwrapped from tick to tick
+    position_m: FloatArray  # (2,) the read-out of the torus, unwrapped from one observation to the next
     log_scale: float  # ln(metres per map unit), never learned
     placed: bool  # whether it is known which repetition of the torus the vehicle is on: the first measured pose tells
     config: BeliefConfig
@@ -36,14 +36,17 @@ class PaperBelief:
 
     @classmethod
     def uniform(cls, start_m: FloatArray, log_scale: float, config: BeliefConfig) -> Self:
-        """No prior knowledge; ``start_m`` (2,) is only a point from which phases are unwrapped."""
+        """Return a belief without prior knowledge.
+
+        ``start_m`` (2,) is any point of the map, near which the position is read out until the first pose is measured.
+        """
         head = head_direction.uniform(config.paper.head)
         grid = grid_cells.uniform(np.array([config.paper.period_m]), config.paper.grid)
         return cls(head, grid, start_m, log_scale, False, config)
 
     @property
     def pose(self) -> FloatArray:
-        """The read-out (3,) of Eqs. (15)-(16)."""
+        """The fused pose (3,) of both populations, Eqs. (15)-(16): m, m, rad."""
         return np.array([self.position_m[0], self.position_m[1], head_direction.read_out(self.head)[0]])
 
     @property
@@ -54,11 +57,11 @@ class PaperBelief:
         return np.diag([1.0 / r_position[0], 1.0 / r_position[1], 1.0 / r_heading])
 
     def activity(self) -> NetworkActivity:
-        """The two networks as they are."""
+        """State of the head-direction and grid-cell networks, which the estimate reports."""
         return network_activity(self.head, self.grid)
 
     def predict(self, motion: Motion) -> Self:
-        """Path integration, mutual inhibition, global inhibition."""
+        """Path integration, then mutual and global inhibition, in both networks as printed in the paper."""
         head = head_direction.integrate(self.head, motion.turned_rad / motion.dt_s, motion.dt_s)
         head = head_direction.inhibit(head, motion.dt_s, self.config.paper.head)
         heading_rad, _ = head_direction.read_out(head)
@@ -69,7 +72,10 @@ class PaperBelief:
         return replace(self, head=head, grid=grid, position_m=position_m)
 
     def inject(self, measurement: PoseMeasurement) -> Self:
-        """Eqs. (13)-(14), Li et al. 2025, with a fixed share of E for reliability; the measurement's covariance is not used."""
+        """Inject a measured pose into the calibration cells, Eqs. (13)-(14), Li et al. 2025.
+
+        Its reliability is a fixed share of E; the covariance of the measurement is not used.
+        """
         paper = self.config.paper
         head = head_direction.stimulate(self.head, float(measurement.pose[2]), paper.strength * paper.head.information)
         per_length = (grid_cells.TURN / paper.period_m) ** 2

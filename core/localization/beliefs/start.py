@@ -13,10 +13,10 @@ from hippodrome.core.types import FloatArray, HippodromeError
 
 
 def start_belief(start_m: FloatArray, log_scale: float, network: RoadNetwork | None, config: BeliefConfig) -> PoseBelief:
-    """No prior knowledge of the pose.
+    """Return the belief before the first observation, which has no prior knowledge of the pose.
 
     Args:
-        start_m: any point of the map (2,), from which phases are unwrapped.
+        start_m: any point (2,) of the map. Grid cells repeat their positions; until a pose is measured, the one near it is taken.
         log_scale: ln(metres per map unit) that this drive is expected to have.
         network: the road network; mode "lanes" needs it.
         config: its ``mode`` picks the kind of belief.

@@ -24,5 +24,5 @@ def log_emission(distance_m: FloatArray, sigma_z_m: float) -> FloatArray:
 
 
 def estimate_sigma_z_m(distance_m: FloatArray) -> float:
-    """sigma_z of Eq. (8), Li et al. 2025: a robust standard deviation of the distances (T,) to the matched positions."""
+    """Estimate sigma_z of Eq. (8), Li et al. 2025, robustly, from the distances (T,) of vertices to their matched positions."""
     return MEDIAN_TO_SIGMA * float(np.median(distance_m))

@@ -8,11 +8,11 @@ from hippodrome.core.types import FloatArray
 
 
 def log_transition(difference_m: FloatArray, beta_m: float) -> FloatArray:
-    """Logarithm of Eq. (9), Li et al. 2025: an exponential density of d_t.
+    """Logarithm of Eq. (9), Li et al. 2025: an exponential density of d_t, which ``distance_difference_m`` defines.
 
     Args:
-        difference_m: (K,) d_t of each transition, infinite where no drive leads from one position to the other.
-        beta_m: mean of d_t.
+        difference_m: (K,) d_t of each transition in metres, infinite where no drive leads from one position to the other.
+        beta_m: mean of d_t under the model.
 
     Returns:
         The log densities (K,), minus infinity where there is no drive.
@@ -28,5 +28,8 @@ def distance_difference_m(measured_m: FloatArray, route_m: FloatArray) -> FloatA
 
 
 def estimate_beta_m(difference_m: FloatArray) -> float:
-    """beta of Eq. (9), Li et al. 2025, from d_t (T - 1,) along the matched route: the median of an exponential is beta ln 2."""
+    """Estimate beta of Eq. (9), Li et al. 2025, from d_t (T - 1,) along the matched route.
+
+    The median is used, as it is robust; that of an exponential distribution is beta ln 2.
+    """
     return float(np.median(difference_m)) / float(np.log(2.0))

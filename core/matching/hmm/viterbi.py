@@ -45,7 +45,10 @@ def viterbi(
 
 @njit(cache=True)
 def _viterbi(trellis: _Trellis) -> tuple[IntArray, IntArray]:
-    """Forward recursion over all steps, then the path traced back from the best state at the end of each part."""
+    """Forward recursion over all steps, then the path traced back from the best state at the end of each part.
+
+    A new part begins where no state could be reached from the step before; it starts from the emissions alone.
+    """
     state_start, log_emission = trellis.state_start, trellis.log_emission
     steps = len(state_start) - 1
     part = np.full(steps, -1, dtype=np.int32)
@@ -66,7 +69,10 @@ def _viterbi(trellis: _Trellis) -> tuple[IntArray, IntArray]:
 
 @njit(cache=True)
 def _extend(trellis: _Trellis, t: int, score: FloatArray, predecessor: IntArray) -> bool:
-    """Score and best predecessor of each state of step ``t``, from the scores of ``t - 1``; False if none can be reached."""
+    """Compute score and best predecessor of each state of step ``t`` from the scores of step ``t - 1``, in place.
+
+    Returns False if no state of the step can be reached.
+    """
     previous, begin, end = trellis.state_start[t - 1], trellis.state_start[t], trellis.state_start[t + 1]
     first, width = trellis.transition_start[t - 1], end - begin
     any_reached = False
@@ -84,7 +90,7 @@ def _extend(trellis: _Trellis, t: int, score: FloatArray, predecessor: IntArray)
 
 @njit(cache=True)
 def _traced_back(state_start: IntArray, part: IntArray, score: FloatArray, predecessor: IntArray) -> IntArray:
-    """The state (T,) of each step on the best path of its part."""
+    """Trace the best path of each part back from its best last state: the state (T,) of each step, -1 if it has none."""
     steps = len(part)
     path = np.full(steps, -1, dtype=np.int32)
     for t in range(steps - 1, -1, -1):

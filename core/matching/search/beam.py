@@ -68,6 +68,7 @@ class _Scratch(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _make_scratch(model: SearchModel) -> _Scratch:
+    """Allocate the memory that the steps share, with both tables set to -1."""
     scale_count = model.scales.shape[0]
     row_of_state = np.full(model.graph.lane.shape[0] * scale_count, -1, np.int32)
     row_of_lane = np.full(model.graph.lane.max() + 1, -1, np.int32)
@@ -156,7 +157,7 @@ def _merge(
 
 @njit(cache=True, error_model="numpy")
 def _forget_states(hypotheses: Hypotheses, scratch: _Scratch) -> None:
-    """Clear the table of states, which knows these hypotheses."""
+    """Set the entries of these hypotheses in the table of states back to -1, for the next step."""
     for i in range(hypotheses.shape[0]):
         if hypotheses[i].bin >= 0:
             scratch.row_of_state[hypotheses[i].bin * scratch.scale_count + hypotheses[i].scale_bin] = -1
@@ -164,7 +165,7 @@ def _forget_states(hypotheses: Hypotheses, scratch: _Scratch) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _keep_best(hypotheses: Hypotheses, least_nats: float, most: int) -> int:
-    """Move those that score at least ``least_nats``, about the ``most`` best of them, to the front; returns their number."""
+    """Move the hypotheses with at least ``least_nats``, about the ``most`` best of them, to the front; returns their number."""
     count = hypotheses.shape[0]
     if count > most:
         scores = np.empty(count, np.float32)
@@ -183,14 +184,16 @@ def _keep_best(hypotheses: Hypotheses, least_nats: float, most: int) -> int:
 def backward(
     drive: Drive, model: SearchModel, margin_nats: float, survivors: Survivors, onward_nats: Float32Array
 ) -> Float32Array:
-    """How far the best complete route through each survivor (rows,) falls behind the best of all.
+    """Backward pass: the score of the best complete route through each survivor (rows,), less that of the best of all.
+
+    It is 0 for the best route, and the more negative the less likely the survivor is.
 
     Args:
         drive: as in the forward pass.
         model: as in the forward pass.
-        margin_nats: survivors farther behind get ``NOWHERE``.
-        survivors: of the forward pass.
-        onward_nats: best score on from each survivor of the last sample; 0 if the drive ends there.
+        margin_nats: survivors that fall farther behind the best route get ``NOWHERE``.
+        survivors: what the forward pass returned.
+        onward_nats: score of the best route onward from each survivor of the last sample; 0 if the drive ends there.
     """
     row_start, rows, places = survivors
     times = row_start.shape[0] - 1
@@ -223,9 +226,9 @@ def backward(
 def _prune_and_index(survivors: Survivors, through: Float32Array, t: int, least_nats: float, scratch: _Scratch) -> float:
     """Prepare the survivors of sample ``t``, whose best complete routes are known, for the step backward from them.
 
-    Survivors below ``least_nats`` become ``NOWHERE``. The table of states learns where the others on the network are; those off
-    it pass the score of their best complete route on to their parents at once. Returns the best score that any of them has still
-    to come.
+    Survivors that score below ``least_nats`` become ``NOWHERE``. The others on the network are entered into the table of states;
+    those off it have a single parent each, to which the score of their best complete route is passed on at once. Returns the
+    largest score that any of them still gains after this sample.
     """
     rows, most_onward = survivors.hypotheses, NOWHERE
     for i in range(survivors.row_start[t], survivors.row_start[t + 1]):
@@ -242,7 +245,11 @@ def _prune_and_index(survivors: Survivors, through: Float32Array, t: int, least_
 
 @njit(cache=True, error_model="numpy")
 def _pass_back(rows: Hypotheses, through: Float32Array, i: int, found: Successors, scratch: _Scratch) -> None:
-    """Raise the score of the best complete route through hypothesis ``i`` to that of the best one over its successors."""
+    """One step of the backward recursion: set ``through[i]`` to the score of the best complete route through hypothesis ``i``.
+
+    A route through a successor scores what the route up to ``i`` scores, plus the log likelihood of the step, plus what the best
+    route onward from the successor adds. Successors that did not survive are not in the table of states and are left out.
+    """
     score = rows[i].score_nats
     for c in range(found.shape[0]):
         at = scratch.row_of_state[found[c].bin * scratch.scale_count + found[c].scale_bin]
@@ -252,11 +259,14 @@ def _pass_back(rows: Hypotheses, through: Float32Array, i: int, found: Successor
 
 @njit(cache=True, error_model="numpy")
 def alternatives(survivors: Survivors, through: Float32Array, points_m: FloatArray, cell: IntArray) -> Alternatives:
-    """The survivors that lead somewhere, thinned: at each sample the best one in each cell of the lanes, and all off the network.
+    """Collect the alternatives to the best route: the survivors through which a complete route within the margin passes.
+
+    Alternatives close to each other are one and the same. Each lane is therefore divided into cells, and at each sample only the
+    best alternative in each cell is kept. Those off the network are all kept.
 
     Args:
-        survivors: of the forward pass.
-        through: (rows,) as the backward pass returns it.
+        survivors: what the forward pass returned.
+        through: (rows,) what the backward pass returned for them.
         points_m: (N, 2) centre of each bin.
         cell: (N,) cell that each bin belongs to.
     """
@@ -265,9 +275,9 @@ def alternatives(survivors: Survivors, through: Float32Array, points_m: FloatArr
     for i in range(rows.shape[0]):
         count += through[i] > NOWHERE
     kept_start, kept = np.zeros(times + 1, np.int64), np.empty(count, np.int32)
-    place_of_cell = np.full(cell.max() + 1, -1, np.int32)
+    kept_of_cell = np.full(cell.max() + 1, -1, np.int32)
     for t in range(times):
-        kept_start[t + 1] = _keep_best_of_cells(survivors, through, t, cell, kept, kept_start[t], place_of_cell)
+        kept_start[t + 1] = _keep_best_of_cells(survivors, through, t, cell, kept, kept_start[t], kept_of_cell)
     size = kept_start[times]
     points, values = np.empty((size, 2), np.float32), np.empty(size, np.float32)
     for j in range(size):
@@ -283,25 +293,27 @@ def alternatives(survivors: Survivors, through: Float32Array, points_m: FloatArr
 
 @njit(cache=True, error_model="numpy")
 def _keep_best_of_cells(
-    survivors: Survivors, through: Float32Array, t: int, cell: IntArray, kept: IntArray, size: int, place_of_cell: IntArray
+    survivors: Survivors, through: Float32Array, t: int, cell: IntArray, kept: IntArray, size: int, kept_of_cell: IntArray
 ) -> int:
-    """Append the rows of one sample that ``alternatives`` keeps to ``kept``, which holds ``size`` rows; returns its new size.
+    """Thin out sample ``t`` for ``alternatives``: append to ``kept`` the row of the best survivor of each cell.
 
-    ``place_of_cell`` is scratch memory: -1 everywhere before and after.
+    The rows of survivors off the network are all appended. ``kept`` holds ``size`` rows before; returns how many it holds
+    afterwards. ``kept_of_cell`` is scratch memory for the index in ``kept`` of each cell's survivor: -1 everywhere before and
+    after.
     """
     rows, first = survivors.hypotheses, size
     for i in range(survivors.row_start[t], survivors.row_start[t + 1]):
         if through[i] == NOWHERE:
             continue
-        at = place_of_cell[cell[rows[i].bin]] if rows[i].bin >= 0 else -1
+        at = kept_of_cell[cell[rows[i].bin]] if rows[i].bin >= 0 else -1
         if at < 0:
             at, size = size, size + 1
             if rows[i].bin >= 0:
-                place_of_cell[cell[rows[i].bin]] = at
+                kept_of_cell[cell[rows[i].bin]] = at
         elif through[i] <= through[kept[at]]:
             continue
         kept[at] = i
     for j in range(first, size):
         if rows[kept[j]].bin >= 0:
-            place_of_cell[cell[rows[kept[j]].bin]] = -1
+            kept_of_cell[cell[rows[kept[j]].bin]] = -1
     return size

@@ -22,10 +22,10 @@ from hippodrome.core.types import IntArray
 MOST_OFF = 192  # hypotheses off the network in one step; beyond this the worst gives way
 _SAME_PLACE_M = 4.0  # closer than this, two hypotheses off the network count as one ...
 _SAME_OFFSET_RAD = 0.3  # ... if their heading offsets are no farther apart than this
-_KNOWN_LANES = 30  # good hypotheses on more lanes than this: the route is not known, so nothing can be said to leave the network
+_KNOWN_LANES = 30  # with good hypotheses on more lanes than this the route is too uncertain to say where it leaves the network
 _PLACE_SIGMA_M = 2.0  # sigma of a place at which the network was just left; it grows with the metres driven since
-_RETURN_SIGMAS = 2.5  # a lane farther away than this is not taken up again
-_OFFSET_SIGMAS = 3.0  # a heading error beyond this many sigmas pulls the heading offset no more than one of this size
+_RETURN_SIGMAS = 2.5  # the vehicle returns to no lane that is more sigmas away than this
+_OFFSET_SIGMAS = 3.0  # heading errors are clipped at this many sigmas before the heading offset follows them
 
 
 class Place(NamedTuple):
@@ -41,20 +41,23 @@ class StepRows(NamedTuple):
 
     begin: int  # hypotheses begin:end are those before the step ...
     end: int
-    size: int  # ... and end:size those after it, as far as they are found
-    place_count: int
+    size: int  # ... and end:size those after it that were found so far
+    place_count: int  # rows of the places that are filled
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def followed_offset(offset_rad: float, turn_rad: float, costs: StepCosts) -> float:
-    """The heading offset after a heading error of ``turn_rad``: it takes over a share of the error, and so follows gyro drift."""
+    """Let the heading offset follow the drift of the gyro: add a share of the heading error ``turn_rad`` of this step.
+
+    The error is clipped first, so that a single large one hardly moves the offset.
+    """
     most = _OFFSET_SIGMAS * costs.heading_sigma_rad
     return wrap_near_zero(offset_rad + costs.offset_gain * min(max(turn_rad, -most), most))
 
 
 @njit(cache=True, error_model="numpy")
 def rejoin(hypothesis: Hypothesis, place: Place, observation: StepObservation, model: SearchModel, out: Successors) -> int:
-    """Bins on which a hypothesis off the network, now at ``place``, may come back: writes them into ``out``, counted."""
+    """Write the bins at which a hypothesis off the network, now at ``place``, may rejoin it into ``out``; returns how many."""
     graph, costs, off = model.graph, model.costs, model.off_network
     spread = _PLACE_SIGMA_M + off.drift * place.driven_m
     radius = _RETURN_SIGMAS * spread
@@ -108,10 +111,11 @@ def drive_off(
     hypotheses: Hypotheses, places: Places, rows: StepRows, best: float, beam_nats: float, observation: StepObservation,
     model: SearchModel, row_of_lane: IntArray,
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Append the hypotheses that are off the network after a step: those that were before it, and those that leave now.
+    """Append the hypotheses that are off the network after a step: those that were off it before, and those that leave it now.
 
-    Both arrays have room for ``MOST_OFF`` more rows. Of hypotheses near each other the best is kept, and of too many the worst
-    gives way.
+    Hypotheses and places must have room for ``MOST_OFF`` more rows. Of hypotheses near each other only the better one is kept,
+    and once there are ``MOST_OFF``, a new one has to beat the worst. ``best`` is the best score of the step so far; a hypothesis
+    more than ``beam_nats`` below it is dropped.
 
     Returns:
         How many hypotheses and how many places there are now, and the best score of the step.
@@ -142,9 +146,10 @@ def drive_off(
 def _row_to_replace(
     hypotheses: Hypotheses, places: Places, first: int, size: int, place: Place, heading_offset_rad: float
 ) -> int:
-    """Among the hypotheses ``first:size`` off the network the last one that is about the same as the new one.
+    """The row of the hypothesis off the network that a new one has to beat, among the rows ``first:size``.
 
-    If there is none, -1 as long as there are fewer than ``MOST_OFF``, else the worst one.
+    It is the last one at about the same place and heading offset; if there is none, the worst one once there are ``MOST_OFF``,
+    and -1, so that the new one is appended, as long as there are fewer.
     """
     same, worst = -1, first
     for other in range(first, size):
@@ -174,9 +179,10 @@ def _going_off(hypotheses: Hypotheses, begin: int, end: int, model: SearchModel,
 
 @njit(cache=True, error_model="numpy")
 def _leaving(hypotheses: Hypotheses, model: SearchModel, row_of_lane: IntArray) -> NDArray[np.int64]:
-    """The best hypothesis on each lane, among those close to the best of all; none if these are on too many lanes.
+    """Choose the hypotheses that leave the network in this step: the best one on each lane; returns their indices.
 
-    ``row_of_lane`` (L,) is scratch memory: -1 everywhere before and after.
+    Only those at most ``spread_nats`` behind the best of all are considered. If they lie on more than ``_KNOWN_LANES`` lanes, the
+    route is too uncertain for any to leave. ``row_of_lane`` (L,) is scratch memory: -1 everywhere before and after.
     """
     lane, best = model.graph.lane, NOWHERE
     for i in range(hypotheses.shape[0]):

@@ -19,8 +19,8 @@ from hippodrome.core.matching.search.problem import InitialHypotheses, SearchPro
 from hippodrome.core.types import Float32Array, FloatArray, IntArray
 
 _MAX_ROWS = 8_000_000  # hypotheses of a section: 200 MB
-_EXACT_NATS = 4000.0  # scores below minus this are counted from a new zero, else single precision rounds them by 0.0005 and more
-_CELL_M = 8.0  # length of a lane's cell: alternatives in one cell are one
+_EXACT_NATS = 4000.0  # scores below minus this are shifted back to 0, as single precision rounds them by 0.0005 and more
+_CELL_M = 8.0  # length of the cells that lanes are divided into: alternatives in one cell count as one
 
 
 class TracedRoute(NamedTuple):
@@ -53,7 +53,7 @@ def forward_pass(
 def most_likely_route(
     problem: SearchProblem, initial: InitialHypotheses, config: RouteSearchConfig, place_prior: FloatArray | None = None
 ) -> TracedRoute | None:
-    """The most likely route from the initial hypotheses over the whole drive; None where no route is as long."""
+    """The most likely route from the initial hypotheses over the whole drive; None if no route of the network is as long."""
     drive = compiled_drive(problem, problem.track.heading_rad, place_prior)
     model = compiled_model(problem)
     sections: list[_Section] = []
@@ -75,7 +75,10 @@ def most_likely_route(
 
 
 def last_survivors(survivors: Survivors) -> InitialHypotheses:
-    """The survivors of the last step, to begin a further search with."""
+    """The survivors of the last step, as the initial hypotheses of a further search.
+
+    Only the places of these survivors are taken along, so that those off the network get new indices of their places.
+    """
     last = survivors.hypotheses[survivors.row_start[-2] : survivors.row_start[-1]].copy()
     off = last["bin"] < 0
     places = survivors.places[-1 - last["bin"][off]]
@@ -96,7 +99,10 @@ def _backward_pass(
     survivors: Survivors,
     config: RouteSearchConfig,
 ) -> TracedRoute:
-    """The best route and its alternatives, section by section from the last, whose survivors are given."""
+    """Trace the best route and its alternatives back through the sections, from the last, whose ``survivors`` are given.
+
+    The survivors of every other section are computed again from its checkpoint.
+    """
     cell = _cells(problem)
     last = last_survivors(survivors).hypotheses
     end, onward = int(np.argmax(last["score_nats"])), np.zeros(len(last), np.float32)
@@ -114,13 +120,13 @@ def _backward_pass(
 
 
 def _onward_nats(through: Float32Array, initial: InitialHypotheses) -> Float32Array:
-    """What each initial hypothesis of a section still leads to: the best complete route through it, less the way to it."""
+    """Score of the best route onward from each initial hypothesis of a section: that of its best complete route, less its own."""
     onward: Float32Array = through[: len(initial.hypotheses)] - initial.hypotheses["score_nats"]
     return onward
 
 
 def _trace_back(survivors: Survivors, end: int) -> IntArray:
-    """Rows (t,) of the route that ends in the ``end``-th survivor of the last step."""
+    """Rows (t,) of the route that ends in the ``end``-th survivor of the last step, found through the parents."""
     row_start, parent = survivors.row_start, survivors.hypotheses["parent"]
     row = np.empty(len(row_start) - 1, np.int32)
     row[-1] = row_start[-2] + end
@@ -132,7 +138,11 @@ def _trace_back(survivors: Survivors, end: int) -> IntArray:
 def _traced(
     problem: SearchProblem, survivors: Survivors, row: IntArray, score_offset_nats: float, thinned: Alternatives
 ) -> TracedRoute:
-    """The route through the given rows (t,) of a section's survivors."""
+    """Look up the points and scores of the part of the best route that consists of the survivors in rows ``row`` (t,).
+
+    ``score_offset_nats`` makes the scores of the section continue those of the section before it. ``thinned`` holds the
+    alternatives of the section, which are passed on.
+    """
     best = survivors.hypotheses[row].copy()
     off = best["bin"] < 0
     points = problem.graph.points_m[np.maximum(best["bin"], 0)].astype(np.float64)
@@ -142,7 +152,7 @@ def _traced(
 
 
 def _joined(parts: list[TracedRoute]) -> TracedRoute:
-    """The sections one after the other; the last sample of each is the first one of the next and counts once."""
+    """Join the sections in driving order; the last sample of each is the first one of the next and counts once."""
     whole = parts[-1]
     for part in parts[-2::-1]:
         whole = TracedRoute(
@@ -155,7 +165,7 @@ def _joined(parts: list[TracedRoute]) -> TracedRoute:
 
 
 def _joined_alternatives(before: Alternatives, after: Alternatives) -> Alternatives:
-    """Those of all samples but the last of ``before``, then those of ``after``."""
+    """Join the alternatives of two consecutive sections; those of the sample that both share are taken from ``after``."""
     kept = before.row_start[-2]
     return Alternatives(
         np.concatenate([before.row_start[:-2], after.row_start + kept]),

@@ -42,7 +42,11 @@ class SearchProblem:
 
 
 def search_problem(visits: Visits, network: RoadNetwork, config: RouteSearchConfig) -> SearchProblem:
-    """The whole network in fine bins, all scales that the drive's speeds allow, and the drive in steps of about ``step_m``."""
+    """Discretise drive and network: steps of about ``step_m``, bins of lanes, and the scales that the drive's speeds allow.
+
+    A short drive is cut into four steps at least. The lane graph looks as far ahead as one step at the largest scale, and some
+    bins farther for the remainder and the tolerance of a step.
+    """
     low, typical, high = scale_range(visits, network)
     log_scale = np.arange(np.log(low), np.log(high) + config.scale_bin, config.scale_bin)
     track = make_track(visits, min(config.step_m / typical, 0.25 * driven_arc(visits)[-1]))

@@ -27,7 +27,7 @@ from hippodrome.core.se2 import wrap
 from hippodrome.core.types import Float32Array, IntArray, StartPose
 
 _HORIZON = 60  # steps (300 m) over which the turns after an anchor are counted: about what makes a start unique
-_MOST_TURN_RAD = 0.5  # turning of one step counts up to this: U-turns do not count more
+_MOST_TURN_RAD = 0.5  # most that the turn of one step counts, so that U-turns do not outweigh other turns
 _MOST_COARSE = 1_000_000  # hypotheses kept at each step of the coarse search: a large town in coarse bins
 _NO_PLACES = np.empty(0, PLACE)
 
@@ -50,7 +50,10 @@ def anchor_samples(track: Track, most: int) -> list[int]:
 
 
 def starts_without_prior(problem: SearchProblem, anchor: int, config: RouteSearchConfig) -> InitialHypotheses:
-    """Hypotheses at the drive's beginning that lead to the good ones at sample ``anchor``."""
+    """Find hypotheses for the beginning of the drive without a start pose, by a search that begins at sample ``anchor``.
+
+    The coarse search rates all bins and scales at the anchor; the good ones are traced back to the beginning of the drive.
+    """
     nats, scales = _coarse_nats(problem, anchor, config), len(problem.log_scale)
     bins = np.flatnonzero(nats.max(axis=1) > NOWHERE).astype(np.int32)
     hypotheses = _hypotheses_in(problem.graph, bins, scales, float(problem.track.heading_rad[anchor]))
@@ -62,7 +65,7 @@ def starts_without_prior(problem: SearchProblem, anchor: int, config: RouteSearc
 
 
 def starts_near_pose(problem: SearchProblem, start: StartPose, config: RouteSearchConfig) -> InitialHypotheses:
-    """Hypotheses near a start pose, at every scale; one at the pose itself, should it lie off the network."""
+    """Hypotheses near a start pose, at every scale, and one at the pose itself, in case it lies off the network."""
     scales = len(problem.log_scale)
     prior = _prior_nats(problem.graph, start)
     near = np.flatnonzero(prior >= prior.max() - config.beam_nats).astype(np.int32)
@@ -73,12 +76,15 @@ def starts_near_pose(problem: SearchProblem, start: StartPose, config: RouteSear
     off["score_nats"] = -config.off_network.leave_nats
     off["heading_offset_rad"] = float(wrap(np.array(start.heading_rad - problem.track.heading_rad[0])))
     places["x_m"], places["y_m"] = start.x_m, start.y_m
-    places["driven_m"] = start.sigma_m / config.off_network.drift  # the drive off the network that leaves as much doubt
+    places["driven_m"] = start.sigma_m / config.off_network.drift  # after so long a drive off the network it is as uncertain
     return InitialHypotheses(np.concatenate([on_network, off]), places)
 
 
 def _hypotheses_in(graph: LaneGraph, bins: IntArray, scales: int, heading_rad: float) -> Hypotheses:
-    """Every scale bin in each of the bins, bin by bin, headed along the lane while odometry says ``heading_rad``."""
+    """Hypotheses for every scale bin in each of the bins, bin by bin.
+
+    Each is headed along its lane while odometry says ``heading_rad``; the difference is its heading offset.
+    """
     rows = np.zeros(len(bins) * scales, HYPOTHESIS)
     rows["bin"] = np.repeat(bins, scales)
     rows["scale_bin"] = np.tile(np.arange(scales, dtype=np.int32), len(bins))
@@ -94,11 +100,13 @@ def _prior_nats(graph: LaneGraph, start: StartPose) -> Float32Array:
 
 
 def _coarse_nats(problem: SearchProblem, anchor: int, config: RouteSearchConfig) -> Float32Array:
-    """How far the best route from each fine bin and scale bin (N, K) at the anchor falls behind the best of all.
+    """Rate each fine bin and scale bin (N, K) as the state at the anchor, by a coarse search over the samples after it.
 
-    It is told by a coarse search over the samples after the anchor; fine bins of one coarse bin get the same answer.
+    The rating is the score of the best route that begins in the state, less that of the best of all; it is ``NOWHERE`` for states
+    more than ``seed_margin_nats`` behind. All fine states within one coarse state get the same rating.
     """
     coarse = _coarse_problem(problem, config)
+    # the steps of the coarse search are twice as long, so that it takes every second sample
     drive, model = compiled_drive(coarse, problem.track.heading_rad[anchor::2]), compiled_model(coarse)
     bin_count, scales = coarse.graph.bin_count, len(coarse.log_scale)
     everywhere = np.arange(bin_count, dtype=np.int32)
@@ -114,19 +122,22 @@ def _coarse_nats(problem: SearchProblem, anchor: int, config: RouteSearchConfig)
 
 
 def _coarse_problem(problem: SearchProblem, config: RouteSearchConfig) -> SearchProblem:
-    """The same drive and network in coarse bins, coarse scale bins and steps of double length."""
-    many = config.coarse
-    log_scale = problem.log_scale[many // 2 :: many]
+    """The same problem with bins and scale bins ``config.coarse`` times as large and steps twice as long.
+
+    It has so few states that all of them can be searched at once.
+    """
+    factor = config.coarse
+    log_scale = problem.log_scale[factor // 2 :: factor]  # the middle of each group of scale bins
     step = 2.0 * problem.track.step  # coarse bins need longer steps, to be moved by more than a bin
-    reach_m = step * float(np.exp(log_scale[-1])) + 4.0 * many * config.bin_m
+    reach_m = step * float(np.exp(log_scale[-1])) + 4.0 * factor * config.bin_m
     return replace(
         problem,
         track=replace(problem.track, step=step),
         log_scale=log_scale,
-        graph=build_lane_graph(problem.network, reach_m, many * config.bin_m),
+        graph=build_lane_graph(problem.network, reach_m, factor * config.bin_m),
         costs=_coarse_costs(config),
-        off_network=replace(config.off_network, leave_nats=1e9),  # a search for the start has nowhere to leave from
-        bin_m=many * config.bin_m,
+        off_network=replace(config.off_network, leave_nats=1e9),  # the start is sought on the network only
+        bin_m=factor * config.bin_m,
     )
 
 
@@ -138,7 +149,7 @@ def _coarse_costs(config: RouteSearchConfig) -> SearchCosts:
 
 
 def _coarse_bin_of_lane(fine: LaneGraph, coarse: LaneGraph) -> IntArray:
-    """For each fine bin (N,), in which coarse bin of its lane it lies, counted from the lane's beginning."""
+    """The coarse bin (N,) in which each fine bin lies, counted from the beginning of its lane."""
     counts = np.diff(fine.lane_start)[fine.lane]
     order = np.arange(fine.bin_count) - fine.lane_start[fine.lane]
     return ((order + 0.5) / counts * np.diff(coarse.lane_start)[fine.lane]).astype(np.int32)
@@ -147,7 +158,10 @@ def _coarse_bin_of_lane(fine: LaneGraph, coarse: LaneGraph) -> IntArray:
 def _traced_to_beginning(
     problem: SearchProblem, anchor: int, hypotheses: Hypotheses, config: RouteSearchConfig
 ) -> InitialHypotheses:
-    """Hypotheses at the drive's beginning, from those at ``anchor``: the search run against time, on lanes driven backwards."""
+    """Trace hypotheses at sample ``anchor`` to the beginning of the drive, by a search that runs backwards in time.
+
+    It runs on the reversed network, where lanes are driven from their end to their beginning and all headings are turned by pi.
+    """
     network = reversed_network(problem.network)
     graph = build_lane_graph(network, problem.graph.reach_limit_m, problem.bin_m)
     backwards = replace(problem, network=network, graph=graph)
@@ -162,7 +176,10 @@ def _traced_to_beginning(
 
 
 def _time_reversed(graph: LaneGraph, hypotheses: Hypotheses) -> Hypotheses:
-    """The same hypotheses with time running the other way, on the reversed network's graph."""
+    """Convert hypotheses between a lane graph and that of the reversed network: the same places, with time running backwards.
+
+    Bins are counted from the other end of their lane, and the driven length beyond a bin's centre changes its sign.
+    """
     turned = hypotheses.copy()
     turned["bin"], turned["remainder_m"] = mirrored(graph, hypotheses["bin"]), -hypotheses["remainder_m"]
     return turned

@@ -18,7 +18,7 @@ from hippodrome.core.matching.search.model import SearchModel, StepCosts, StepOb
 from hippodrome.core.matching.search.off_network import dead_reckoned, followed_offset, rejoin
 from hippodrome.core.se2 import wrap_near_zero
 
-MOST_SUCCESSORS = 2048  # of one hypothesis: a few bins x scale bins x branches of a junction, or the bins around a place
+MOST_SUCCESSORS = 2048  # room for one hypothesis: a few bins x scale bins x branches of a junction, or the bins around a place
 _FARTHEST_JUMP = 12  # scale bins of the largest jump in scale: 50 % either way
 _JUMP_SPREAD = 2.0  # only hypotheses this close to the best (nats) may jump in scale ...
 _MOST_JUMPING = 200  # ... and only if they are no more than this
@@ -42,7 +42,7 @@ def successors(
     hypothesis: Hypothesis, places: Places, observation: StepObservation, model: SearchModel, may_jump: bool, most_cost: float,
     out: Successors,
 ) -> int:  # fmt: skip
-    """Successors on the network of one hypothesis, on the network or off it: writes them into ``out``, returns their number."""
+    """Write the successors on the network of one hypothesis, itself on or off the network, into ``out``; returns their number."""
     if hypothesis.bin >= 0:
         return expand(hypothesis, observation, model, may_jump, most_cost, out)
     return rejoin(hypothesis, dead_reckoned(hypothesis, places, observation, model), observation, model, out)
@@ -52,10 +52,10 @@ def successors(
 def expand(
     hypothesis: Hypothesis, observation: StepObservation, model: SearchModel, may_jump: bool, most_cost: float, out: Successors
 ) -> int:
-    """Successors of one hypothesis on the network that cost at most ``most_cost``: writes them into ``out``, counted.
+    """Write the successors of a hypothesis on the network that cost at most ``most_cost`` into ``out``; returns their number.
 
-    The scale may change by one bin, or by many if ``may_jump``. At the present scale a bin either side of the predicted one is
-    tried too, for corners cut or swung out.
+    The scale may change by one bin, or by many if ``may_jump``. Without a change of scale, bins next to the predicted one are
+    tried too, since a corner that is cut or taken wide makes the driven length differ from that of the lane.
     """
     own, remainder = hypothesis.scale_bin, float(hypothesis.remainder_m)
     offset = float(hypothesis.heading_offset_rad)
@@ -70,7 +70,7 @@ def expand(
         ahead = observation.step * scales[scale_bin] + remainder
         tolerance = 3.0 * costs.half_bin_m if scale_bin == own else costs.half_bin_m
         while first < last and graph.reach_m[first] < ahead - 3.0 * costs.half_bin_m:
-            first += 1  # scales ascend, so that what is too near for this one is too near for the next
+            first += 1  # scales ascend, so that a bin too near for this scale is too near for the next one
         heading = observation.heading_rad + offset
         prediction = _Prediction(scale_bin, cost, ahead, tolerance, offset, heading, first, last)
         count = _append_reached(prediction, observation, model, most_cost, out, count)
@@ -130,9 +130,9 @@ def _place_cost(x_m: float, y_m: float, observation: StepObservation, costs: Ste
 
 @njit(cache=True, error_model="numpy")
 def jump_bar(hypotheses: Hypotheses) -> tuple[float, int]:
-    """Who may jump in scale, and who is best: the least score from which on hypotheses may jump, and the index of the best one.
+    """The least score with which a hypothesis may jump in scale, and the index of the best hypothesis.
 
-    The score is infinite while too many hypotheses are about as good: jumps would multiply them.
+    The least score is infinite while many hypotheses are about as good as the best, as jumps would multiply them.
     """
     lead = 0
     for i in range(hypotheses.shape[0]):

@@ -44,13 +44,13 @@ def make_track(visits: Visits, step: float) -> Track:
 
 
 def driven_arc(visits: Visits) -> FloatArray:
-    """Arc length (S,) driven up to each visit, map units.
+    """Arc length (S,) driven up to each visit, in map units.
 
-    A motion is the chord of the way between two visits; it is lengthened to the circular arc that its turn tells.
+    The motion between two visits is a chord. It is converted to the length of the circular arc that turns by the measured angle.
     """
     half_turn = 0.5 * np.clip(np.abs(visits.motion[:, 2]), 0.0, np.pi)
     chord = np.hypot(visits.motion[:, 0], visits.motion[:, 1])
-    arc: FloatArray = np.cumsum(chord / np.sinc(half_turn / np.pi))
+    arc: FloatArray = np.cumsum(chord / np.sinc(half_turn / np.pi))  # chord / arc = sin(half_turn) / half_turn
     return arc
 
 

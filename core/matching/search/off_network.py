@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from hippodrome.core.matching.search.hypotheses import NOWHERE, Hypotheses, Hypothesis, Places, Successors
+from hippodrome.core.matching.search.hypotheses import Hypotheses, Hypothesis, Places, Successors, index_of_best
 from hippodrome.core.matching.search.model import SearchModel, StepCosts, StepObservation
 from hippodrome.core.roads.lane_graph import BinGrid
 from hippodrome.core.se2 import wrap_near_zero
@@ -104,9 +104,9 @@ def dead_reckoned(hypothesis: Hypothesis, places: Places, observation: StepObser
 
 
 @njit(cache=True, error_model="numpy")
-def drive_off(
+def step_off_network(
     hypotheses: Hypotheses, places: Places, rows: StepRows, best: float, beam_nats: float, observation: StepObservation,
-    model: SearchModel, row_of_lane: IntArray,
+    model: SearchModel, index_of_lane: IntArray,
 ) -> tuple[int, int, float]:  # fmt: skip
     """Append the hypotheses that are off the network after a step: those that were before it, and those that leave now.
 
@@ -117,7 +117,7 @@ def drive_off(
         How many hypotheses and how many places there are now, and the best score of the step.
     """
     off, size, place_count = model.off_network, rows.size, rows.place_count
-    for i in _going_off(hypotheses, rows.begin, rows.end, model, row_of_lane):
+    for i in _going_off(hypotheses, rows.begin, rows.end, model, index_of_lane):
         parent = hypotheses[i]
         total = parent.score_nats - off.step_nats - (0.0 if parent.bin < 0 else off.leave_nats)
         if total < best - beam_nats:
@@ -159,34 +159,32 @@ def _row_to_replace(
 
 
 @njit(cache=True, error_model="numpy")
-def _going_off(hypotheses: Hypotheses, begin: int, end: int, model: SearchModel, row_of_lane: IntArray) -> NDArray[np.int64]:
+def _going_off(hypotheses: Hypotheses, begin: int, end: int, model: SearchModel, index_of_lane: IntArray) -> NDArray[np.int64]:
     """Rows of the hypotheses that are off the network after the step: those off it already, then those that leave it now."""
     rows, count = np.empty(end - begin + _KNOWN_LANES, np.int64), 0
     for i in range(begin, end):
         if hypotheses[i].bin < 0:
             rows[count] = i
             count += 1
-    for i in _leaving(hypotheses[begin:end], model, row_of_lane):
+    for i in _leaving(hypotheses[begin:end], model, index_of_lane):
         rows[count] = begin + i
         count += 1
     return rows[:count]
 
 
 @njit(cache=True, error_model="numpy")
-def _leaving(hypotheses: Hypotheses, model: SearchModel, row_of_lane: IntArray) -> NDArray[np.int64]:
+def _leaving(hypotheses: Hypotheses, model: SearchModel, index_of_lane: IntArray) -> NDArray[np.int64]:
     """The best hypothesis on each lane, among those close to the best of all; none if these are on too many lanes.
 
-    ``row_of_lane`` (L,) is scratch memory: -1 everywhere before and after.
+    ``index_of_lane`` (L,) is scratch memory, -1 everywhere before and after: where in the answer the lane's best hypothesis is.
     """
-    lane, best = model.graph.lane, NOWHERE
-    for i in range(hypotheses.shape[0]):
-        best = max(best, hypotheses[i].score_nats)
+    lane, best = model.graph.lane, hypotheses[index_of_best(hypotheses)].score_nats
     found, count = np.empty(_KNOWN_LANES, np.int64), 0
     route_is_known = True
     for i in range(hypotheses.shape[0]):
         if hypotheses[i].bin < 0 or hypotheses[i].score_nats < best - model.off_network.spread_nats:
             continue
-        at = row_of_lane[lane[hypotheses[i].bin]]
+        at = index_of_lane[lane[hypotheses[i].bin]]
         if at >= 0:
             if hypotheses[i].score_nats > hypotheses[found[at]].score_nats:
                 found[at] = i
@@ -194,9 +192,9 @@ def _leaving(hypotheses: Hypotheses, model: SearchModel, row_of_lane: IntArray) 
             route_is_known = False
             break
         else:
-            row_of_lane[lane[hypotheses[i].bin]] = count
+            index_of_lane[lane[hypotheses[i].bin]] = count
             found[count] = i
             count += 1
     for n in range(count):
-        row_of_lane[lane[hypotheses[found[n]].bin]] = -1
+        index_of_lane[lane[hypotheses[found[n]].bin]] = -1
     return found[:count] if route_is_known else found[:0]

@@ -99,8 +99,8 @@ def dead_reckoned(hypothesis: Hypothesis, places: Places, observation: StepObser
     x, y = far * math.cos(course), far * math.sin(course)
     if hypothesis.bin >= 0:
         return Place(x + model.graph.points_m[hypothesis.bin, 0], y + model.graph.points_m[hypothesis.bin, 1], far)
-    left = places[-1 - hypothesis.bin]
-    return Place(x + left.x_m, y + left.y_m, far + left.driven_m)
+    before = places[-1 - hypothesis.bin]
+    return Place(x + before.x_m, y + before.y_m, far + before.driven_m)
 
 
 @njit(cache=True, error_model="numpy")
@@ -130,9 +130,9 @@ def step_off_network(
             hypotheses[at].bin = -place_count
         elif total <= hypotheses[at].score_nats:
             continue
-        there = places[-1 - hypotheses[at].bin]
-        there.x_m, there.y_m, there.driven_m = place.x_m, place.y_m, place.driven_m
         child = hypotheses[at]
+        own_place = places[-1 - child.bin]
+        own_place.x_m, own_place.y_m, own_place.driven_m = place.x_m, place.y_m, place.driven_m
         child.scale_bin, child.parent, child.score_nats = parent.scale_bin, i, total
         child.heading_offset_rad, child.remainder_m = parent.heading_offset_rad, 0.0
     return size, place_count, best
@@ -148,9 +148,9 @@ def _row_to_replace(
     """
     same, worst = -1, first
     for other in range(first, size):
-        there = places[-1 - hypotheses[other].bin]
+        other_place = places[-1 - hypotheses[other].bin]
         if (
-            abs(there.x_m - place.x_m) + abs(there.y_m - place.y_m) < _SAME_PLACE_M
+            abs(other_place.x_m - place.x_m) + abs(other_place.y_m - place.y_m) < _SAME_PLACE_M
             and abs(wrap_near_zero(hypotheses[other].heading_offset_rad - heading_offset_rad)) < _SAME_OFFSET_RAD
         ):
             same = other

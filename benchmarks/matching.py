@@ -95,8 +95,7 @@ def _ours_on_trace(network: RoadNetwork, trace_m: FloatArray) -> IntArray:
 
 def _lanes_at(route: Route) -> IntArray:
     """Lane (S,) at each visit: that of the nearest sample of the track."""
-    nearest = np.clip(np.round(route.track.visit_arc / route.track.step).astype(np.int64), 0, len(route.lane) - 1)
-    return route.lane[nearest]
+    return route.lane[route.track.visit_samples()]
 
 
 def _dead_reckoned(drive: SyntheticDrive) -> FloatArray:

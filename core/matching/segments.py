@@ -98,13 +98,13 @@ def consistent_with_closures(
     sample = route.track.visit_samples()
     ends = np.stack([sample[closures.source], sample[closures.target]])
     agrees = np.hypot(*(route.points_m[ends[0]] - route.points_m[ends[1]]).T) < distant_m
-    left = list(segments)
-    while left:
-        within = np.stack([(ends >= segment.first) & (ends < segment.end) for segment in left])  # (segments, 2, closures)
+    remaining = list(segments)
+    while remaining:
+        within = np.stack([(ends >= segment.first) & (ends < segment.end) for segment in remaining])  # (segments, 2, closures)
         joins_two = np.all(np.any(within, axis=0), axis=0)
         votes = [agrees[joins_two & np.any(own, axis=0)] for own in within]
         shares = [float(np.mean(vote)) if len(vote) >= least_votes else 1.0 for vote in votes]
         if min(shares) >= least_share:
             break
-        del left[int(np.argmin(shares))]
-    return left
+        del remaining[int(np.argmin(shares))]
+    return remaining

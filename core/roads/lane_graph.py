@@ -1,7 +1,7 @@
 """The directed lane graph cut into bins of about 1 m, with a table of what lies ahead of every bin.
 
 Distances are the true arc lengths between bin centres, so that a lane of 0.1 m (common in converted CARLA towns) costs 0.1 m
-and rounding errors do not add up along a lane that is longer than its bins tell.
+and rounding to whole bins does not add up along a route.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ S. Ortmanns, "High quality word graphs using forward-backward pruning", 1999). W
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -24,10 +24,11 @@ from hippodrome.core.matching.search.hypotheses import (
     Hypotheses,
     Places,
     Successors,
+    index_of_best,
     with_room,
 )
 from hippodrome.core.matching.search.model import Drive, SearchModel, StepObservation, observation_of_step
-from hippodrome.core.matching.search.off_network import MOST_OFF, StepRows, drive_off
+from hippodrome.core.matching.search.off_network import MOST_OFF, StepRows, step_off_network
 from hippodrome.core.matching.search.successors import MOST_SUCCESSORS, jump_bar, successors
 from hippodrome.core.types import Float32Array, FloatArray, IntArray
 
@@ -61,7 +62,7 @@ class _Scratch(NamedTuple):
     """Memory that the steps share; the two tables hold -1 everywhere between steps."""
 
     row_of_state: IntArray  # (N * K,) row of the hypothesis in each state, bin by bin
-    row_of_lane: IntArray  # (L,)
+    index_of_lane: IntArray  # (L,) which of the hypotheses that leave the network is on each lane
     successors: Successors  # (MOST_SUCCESSORS,)
     scale_count: int  # K
 
@@ -71,8 +72,14 @@ def _make_scratch(model: SearchModel) -> _Scratch:
     """Allocate the memory that the steps share, with both tables set to -1."""
     scale_count = model.scales.shape[0]
     row_of_state = np.full(model.graph.lane.shape[0] * scale_count, -1, np.int32)
-    row_of_lane = np.full(model.graph.lane.max() + 1, -1, np.int32)
-    return _Scratch(row_of_state, row_of_lane, np.empty(MOST_SUCCESSORS, SUCCESSOR), scale_count)
+    index_of_lane = np.full(model.graph.lane.max() + 1, -1, np.int32)
+    return _Scratch(row_of_state, index_of_lane, np.empty(MOST_SUCCESSORS, SUCCESSOR), scale_count)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _state(row: Any, scratch: _Scratch) -> int:
+    """Number of the state, bin and scale bin, of a hypothesis on the network or of a successor."""
+    return int(row.bin * scratch.scale_count + row.scale_bin)
 
 
 @njit(cache=True, error_model="numpy")
@@ -82,28 +89,30 @@ def forward(drive: Drive, model: SearchModel, limits: BeamLimits, initial: Hypot
     Returns:
         The survivors of the t <= T samples searched; t < T if a limit was reached or no hypothesis was left.
     """
-    times = drive.heading_rad.shape[0]
+    samples = drive.heading_rad.shape[0]
     size, place_count = initial.shape[0], initial_places.shape[0]
     rows, places = with_room(initial, size + 1), with_room(initial_places, place_count + 1)
-    row_start = np.zeros(times + 1, np.int64)
+    row_start = np.zeros(samples + 1, np.int64)
     row_start[1] = size
     scratch = _make_scratch(model)
-    for t in range(1, times):
+    for t in range(1, samples):
         begin, end = row_start[t - 1], row_start[t]
         observation = observation_of_step(drive, t)
-        rows, size, best = _drive_on(rows, places, begin, end, observation, model, limits.beam_nats, scratch)
+        rows, size, best = _step_on_network(rows, places, begin, end, observation, model, limits.beam_nats, scratch)
         rows, places = with_room(rows, size + MOST_OFF), with_room(places, place_count + MOST_OFF)
         filled = StepRows(begin, end, size, place_count)
-        size, place_count, best = drive_off(rows, places, filled, best, limits.beam_nats, observation, model, scratch.row_of_lane)
+        size, place_count, best = step_off_network(
+            rows, places, filled, best, limits.beam_nats, observation, model, scratch.index_of_lane
+        )
         row_start[t + 1] = end + _keep_best(rows[end:size], best - limits.beam_nats, limits.most_survivors)
         if row_start[t + 1] - end <= limits.enough_survivors or row_start[t + 1] >= limits.most_rows:
-            times = t + 1 if row_start[t + 1] > end else t
+            samples = t + 1 if row_start[t + 1] > end else t
             break
-    return Survivors(row_start[: times + 1], rows[: row_start[times]], places[:place_count])
+    return Survivors(row_start[: samples + 1], rows[: row_start[samples]], places[:place_count])
 
 
 @njit(cache=True, error_model="numpy")
-def _drive_on(
+def _step_on_network(
     rows: Hypotheses, places: Places, begin: int, end: int, observation: StepObservation, model: SearchModel, beam_nats: float,
     scratch: _Scratch,
 ) -> tuple[Hypotheses, int, float]:  # fmt: skip
@@ -112,10 +121,11 @@ def _drive_on(
     Returns:
         The rows, moved if there was no room left, how many there are now, and the best score of the step.
     """
-    jump_from, lead = jump_bar(rows[begin:end])
+    lead = begin + index_of_best(rows[begin:end])
+    jump_from = jump_bar(rows[begin:end], rows[lead].score_nats)
     size, best = end, NOWHERE
-    for n in range(-1, end - begin):
-        i = begin + (lead if n < 0 else n)  # the best goes first: what it leads to sets the bar for the others
+    for n in range(begin - 1, end):
+        i = lead if n < begin else n  # the best goes first: what it leads to sets the bar for the others
         score = rows[i].score_nats
         if n == lead or score < best - beam_nats:
             continue
@@ -141,7 +151,7 @@ def _merge(
         if total < best - beam_nats:
             continue
         best = max(best, total)
-        state = found[c].bin * scratch.scale_count + found[c].scale_bin
+        state = _state(found[c], scratch)
         at = scratch.row_of_state[state]
         if at < 0:
             at = size
@@ -160,7 +170,7 @@ def _forget_states(hypotheses: Hypotheses, scratch: _Scratch) -> None:
     """Set the entries of these hypotheses in the table of states back to -1, for the next step."""
     for i in range(hypotheses.shape[0]):
         if hypotheses[i].bin >= 0:
-            scratch.row_of_state[hypotheses[i].bin * scratch.scale_count + hypotheses[i].scale_bin] = -1
+            scratch.row_of_state[_state(hypotheses[i], scratch)] = -1
 
 
 @njit(cache=True, error_model="numpy")
@@ -206,11 +216,11 @@ def backward(
     for t in range(times - 1, 0, -1):
         begin, end = row_start[t - 1], row_start[t]
         observation = observation_of_step(drive, t)
-        jump_from, _ = jump_bar(rows[begin:end])
+        jump_from = jump_bar(rows[begin:end], rows[begin + index_of_best(rows[begin:end])].score_nats)
         most_onward = _prune_and_index(survivors, through, t, best - margin_nats, scratch)
         for i in range(begin, end):
             score = rows[i].score_nats
-            most_cost = score + most_onward - best + margin_nats
+            most_cost = score + most_onward - best + margin_nats  # a successor that costs more leads nowhere within the margin
             if most_cost < 0.0:
                 continue
             may_jump = score >= jump_from
@@ -237,7 +247,7 @@ def _prune_and_index(survivors: Survivors, through: Float32Array, t: int, least_
             continue
         most_onward = max(most_onward, through[i] - rows[i].score_nats)
         if rows[i].bin >= 0:
-            scratch.row_of_state[rows[i].bin * scratch.scale_count + rows[i].scale_bin] = i
+            scratch.row_of_state[_state(rows[i], scratch)] = i
         else:
             through[rows[i].parent] = max(through[rows[i].parent], through[i])
     return most_onward
@@ -252,7 +262,7 @@ def _pass_back(rows: Hypotheses, through: Float32Array, i: int, found: Successor
     """
     score = rows[i].score_nats
     for c in range(found.shape[0]):
-        at = scratch.row_of_state[found[c].bin * scratch.scale_count + found[c].scale_bin]
+        at = scratch.row_of_state[_state(found[c], scratch)]
         if at >= 0:
             through[i] = max(through[i], score + found[c].log_likelihood + (through[at] - rows[at].score_nats))
 

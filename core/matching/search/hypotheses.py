@@ -56,6 +56,15 @@ SUCCESSOR = np.dtype(
 
 
 @njit(cache=True, error_model="numpy")
+def index_of_best(hypotheses: Hypotheses) -> int:
+    """The first of the hypotheses with the highest score; there must be one at least."""
+    best = 0
+    for i in range(hypotheses.shape[0]):
+        best = i if hypotheses[i].score_nats > hypotheses[best].score_nats else best
+    return best
+
+
+@njit(cache=True, error_model="numpy")
 def with_room(rows: NDArray[Any], size: int) -> NDArray[Any]:
     """``rows`` itself if it holds ``size`` rows, else a copy at least twice as long."""
     if size <= rows.shape[0]:

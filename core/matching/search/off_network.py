@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from hippodrome.core.matching.search.hypotheses import NOWHERE, Hypotheses, Hypothesis, Places, Successors
+from hippodrome.core.matching.search.hypotheses import Hypotheses, Hypothesis, Places, Successors, index_of_best
 from hippodrome.core.matching.search.model import SearchModel, StepCosts, StepObservation
 from hippodrome.core.roads.lane_graph import BinGrid
 from hippodrome.core.se2 import wrap_near_zero
@@ -102,14 +102,14 @@ def dead_reckoned(hypothesis: Hypothesis, places: Places, observation: StepObser
     x, y = far * math.cos(course), far * math.sin(course)
     if hypothesis.bin >= 0:
         return Place(x + model.graph.points_m[hypothesis.bin, 0], y + model.graph.points_m[hypothesis.bin, 1], far)
-    left = places[-1 - hypothesis.bin]
-    return Place(x + left.x_m, y + left.y_m, far + left.driven_m)
+    before = places[-1 - hypothesis.bin]
+    return Place(x + before.x_m, y + before.y_m, far + before.driven_m)
 
 
 @njit(cache=True, error_model="numpy")
-def drive_off(
+def step_off_network(
     hypotheses: Hypotheses, places: Places, rows: StepRows, best: float, beam_nats: float, observation: StepObservation,
-    model: SearchModel, row_of_lane: IntArray,
+    model: SearchModel, index_of_lane: IntArray,
 ) -> tuple[int, int, float]:  # fmt: skip
     """Append the hypotheses that are off the network after a step: those that were off it before, and those that leave it now.
 
@@ -121,7 +121,7 @@ def drive_off(
         How many hypotheses and how many places there are now, and the best score of the step.
     """
     off, size, place_count = model.off_network, rows.size, rows.place_count
-    for i in _going_off(hypotheses, rows.begin, rows.end, model, row_of_lane):
+    for i in _going_off(hypotheses, rows.begin, rows.end, model, index_of_lane):
         parent = hypotheses[i]
         total = parent.score_nats - off.step_nats - (0.0 if parent.bin < 0 else off.leave_nats)
         if total < best - beam_nats:
@@ -134,9 +134,9 @@ def drive_off(
             hypotheses[at].bin = -place_count
         elif total <= hypotheses[at].score_nats:
             continue
-        there = places[-1 - hypotheses[at].bin]
-        there.x_m, there.y_m, there.driven_m = place.x_m, place.y_m, place.driven_m
         child = hypotheses[at]
+        own_place = places[-1 - child.bin]
+        own_place.x_m, own_place.y_m, own_place.driven_m = place.x_m, place.y_m, place.driven_m
         child.scale_bin, child.parent, child.score_nats = parent.scale_bin, i, total
         child.heading_offset_rad, child.remainder_m = parent.heading_offset_rad, 0.0
     return size, place_count, best
@@ -153,9 +153,9 @@ def _row_to_replace(
     """
     same, worst = -1, first
     for other in range(first, size):
-        there = places[-1 - hypotheses[other].bin]
+        other_place = places[-1 - hypotheses[other].bin]
         if (
-            abs(there.x_m - place.x_m) + abs(there.y_m - place.y_m) < _SAME_PLACE_M
+            abs(other_place.x_m - place.x_m) + abs(other_place.y_m - place.y_m) < _SAME_PLACE_M
             and abs(wrap_near_zero(hypotheses[other].heading_offset_rad - heading_offset_rad)) < _SAME_OFFSET_RAD
         ):
             same = other
@@ -164,35 +164,34 @@ def _row_to_replace(
 
 
 @njit(cache=True, error_model="numpy")
-def _going_off(hypotheses: Hypotheses, begin: int, end: int, model: SearchModel, row_of_lane: IntArray) -> NDArray[np.int64]:
+def _going_off(hypotheses: Hypotheses, begin: int, end: int, model: SearchModel, index_of_lane: IntArray) -> NDArray[np.int64]:
     """Rows of the hypotheses that are off the network after the step: those off it already, then those that leave it now."""
     rows, count = np.empty(end - begin + _KNOWN_LANES, np.int64), 0
     for i in range(begin, end):
         if hypotheses[i].bin < 0:
             rows[count] = i
             count += 1
-    for i in _leaving(hypotheses[begin:end], model, row_of_lane):
+    for i in _leaving(hypotheses[begin:end], model, index_of_lane):
         rows[count] = begin + i
         count += 1
     return rows[:count]
 
 
 @njit(cache=True, error_model="numpy")
-def _leaving(hypotheses: Hypotheses, model: SearchModel, row_of_lane: IntArray) -> NDArray[np.int64]:
+def _leaving(hypotheses: Hypotheses, model: SearchModel, index_of_lane: IntArray) -> NDArray[np.int64]:
     """Choose the hypotheses that leave the network in this step: the best one on each lane; returns their indices.
 
     Only those at most ``spread_nats`` behind the best of all are considered. If they lie on more than ``_KNOWN_LANES`` lanes, the
-    route is too uncertain for any to leave. ``row_of_lane`` (L,) is scratch memory: -1 everywhere before and after.
+    route is too uncertain for any to leave. ``index_of_lane`` (L,) is scratch memory: -1 everywhere before and after, in between the
+    place of the lane's best hypothesis in the answer.
     """
-    lane, best = model.graph.lane, NOWHERE
-    for i in range(hypotheses.shape[0]):
-        best = max(best, hypotheses[i].score_nats)
+    lane, best = model.graph.lane, hypotheses[index_of_best(hypotheses)].score_nats
     found, count = np.empty(_KNOWN_LANES, np.int64), 0
     route_is_known = True
     for i in range(hypotheses.shape[0]):
         if hypotheses[i].bin < 0 or hypotheses[i].score_nats < best - model.off_network.spread_nats:
             continue
-        at = row_of_lane[lane[hypotheses[i].bin]]
+        at = index_of_lane[lane[hypotheses[i].bin]]
         if at >= 0:
             if hypotheses[i].score_nats > hypotheses[found[at]].score_nats:
                 found[at] = i
@@ -200,9 +199,9 @@ def _leaving(hypotheses: Hypotheses, model: SearchModel, row_of_lane: IntArray) 
             route_is_known = False
             break
         else:
-            row_of_lane[lane[hypotheses[i].bin]] = count
+            index_of_lane[lane[hypotheses[i].bin]] = count
             found[count] = i
             count += 1
     for n in range(count):
-        row_of_lane[lane[hypotheses[found[n]].bin]] = -1
+        index_of_lane[lane[hypotheses[found[n]].bin]] = -1
     return found[:count] if route_is_known else found[:0]

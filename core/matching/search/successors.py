@@ -57,21 +57,21 @@ def expand(
     The scale may change by one bin, or by many if ``may_jump``. Without a change of scale, bins next to the predicted one are
     tried too, since a corner that is cut or taken wide makes the driven length differ from that of the lane.
     """
-    own, remainder = hypothesis.scale_bin, float(hypothesis.remainder_m)
-    offset = float(hypothesis.heading_offset_rad)
     graph, costs, scales = model.graph, model.costs, model.scales
+    own, offset, remainder = hypothesis.scale_bin, float(hypothesis.heading_offset_rad), float(hypothesis.remainder_m)
+    heading = observation.heading_rad + offset
     first, last = graph.reach_start[hypothesis.bin], graph.reach_start[hypothesis.bin + 1]
     farthest = _FARTHEST_JUMP if may_jump else 1
+    half_bin, with_neighbour = costs.half_bin_m, 3.0 * costs.half_bin_m  # from the centre to the end of the bin, of the next one
     count = 0
     for scale_bin in range(max(own - farthest, 0), min(own + farthest + 1, scales.shape[0])):
         cost = min(costs.scale_step_nats * abs(scale_bin - own), costs.scale_jump_nats)
         if cost > most_cost:
             continue
         ahead = observation.step * scales[scale_bin] + remainder
-        tolerance = 3.0 * costs.half_bin_m if scale_bin == own else costs.half_bin_m
-        while first < last and graph.reach_m[first] < ahead - 3.0 * costs.half_bin_m:
+        while first < last and graph.reach_m[first] < ahead - with_neighbour:
             first += 1  # scales ascend, so that a bin too near for this scale is too near for the next one
-        heading = observation.heading_rad + offset
+        tolerance = with_neighbour if scale_bin == own else half_bin
         prediction = _Prediction(scale_bin, cost, ahead, tolerance, offset, heading, first, last)
         count = _append_reached(prediction, observation, model, most_cost, out, count)
     return count
@@ -129,16 +129,13 @@ def _place_cost(x_m: float, y_m: float, observation: StepObservation, costs: Ste
 
 
 @njit(cache=True, error_model="numpy")
-def jump_bar(hypotheses: Hypotheses) -> tuple[float, int]:
-    """The least score with which a hypothesis may jump in scale, and the index of the best hypothesis.
+def jump_bar(hypotheses: Hypotheses, best_nats: float) -> float:
+    """The least score with which a hypothesis may jump in scale: close to ``best_nats``, the best score of its step.
 
-    The least score is infinite while many hypotheses are about as good as the best, as jumps would multiply them.
+    It is infinite while many hypotheses are about as good as the best, as jumps would multiply them.
     """
-    lead = 0
-    for i in range(hypotheses.shape[0]):
-        lead = i if hypotheses[i].score_nats > hypotheses[lead].score_nats else lead
-    bar = hypotheses[lead].score_nats - _JUMP_SPREAD
+    bar = best_nats - _JUMP_SPREAD
     count = 0
     for i in range(hypotheses.shape[0]):
         count += hypotheses[i].score_nats >= bar
-    return (bar if count <= _MOST_JUMPING else math.inf), lead
+    return bar if count <= _MOST_JUMPING else math.inf

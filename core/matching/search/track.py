@@ -13,7 +13,7 @@ from hippodrome.core.types import FloatArray, HippodromeError, Visits
 WANDER = 1.5  # factor by which the scale may leave its usual value for a while, as after a restart of visual odometry
 WIDE_SCALES = (0.1, 1.0, 10.0)  # metres per map unit tried when the visits carry no usable time
 _BRISK_PERCENTILE = 90.0  # brisk speed of a drive among its speeds while moving: stops and jams do not lower it much
-_BRISK_SHARES = (0.25, 1.3)  # brisk speed over the network's speed limits: an anxious driver in a jam, a reckless one
+_BRISK_SHARES = (0.25, 1.3)  # least and largest brisk speed of a drive, as shares of the network's speed limits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,5 +70,5 @@ def scale_range(visits: Visits, network: RoadNetwork) -> tuple[float, float, flo
     brisk = float(np.percentile(speed, _BRISK_PERCENTILE))
     limit = network.speed_limit_mps[~network.is_internal]
     usual = float(np.median(limit))
-    slowest, fastest = _BRISK_SHARES
-    return slowest / WANDER * usual / brisk, usual / brisk, fastest * WANDER * float(np.max(limit)) / brisk
+    least, largest = _BRISK_SHARES
+    return least / WANDER * usual / brisk, usual / brisk, largest * WANDER * float(np.max(limit)) / brisk

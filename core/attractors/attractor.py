@@ -38,7 +38,7 @@ class AttractorConfig:
 
     mode: Literal["paper", "bounded"] = "bounded"
     information: float = 100.0  # E, the most information a network holds, 1/rad^2; the published family has 100 for the heading
-    calibration_share: float = 0.1  # share of the information that the calibration cells get at the start and by a hand-back
+    calibration_share: float = 0.1  # share of the information for the calibration cells when both populations hold one belief
     inhibition_integrator: float = 0.02  # Delta_inte, Eq. (6), on the integrator; per update (mode paper) or second (bounded)
     inhibition_calibration: float = 0.02  # Delta_cali, Eq. (7), likewise; at 0.02 an unconfirmed rival fades in some ten seconds
     floor: float = 1e-6  # least reliability as a share of E; Eqs. (6)-(7) alone would let reliabilities become negative
@@ -115,7 +115,7 @@ def circular_mean(mu_a: Real, mu_b: Real, weight_b: Real) -> Real:
 def inject(mu_cali: Real, r_cali: Real, mu_inject: Real, r_inject: Real) -> tuple[Real, Real]:
     """Eqs. (13)-(14), Li et al. 2025: a recognised view feeds the calibration cells, as a product of two Gaussians.
 
-    The view speaks for the mean ``mu_inject`` with reliability ``r_inject``; returns the new mean and reliability.
+    The view measures ``mu_inject`` with reliability ``r_inject``; returns the calibration cells' new mean and reliability.
     """
     r_new = r_cali + r_inject
     return circular_mean(mu_cali, mu_inject, r_inject / r_new), r_new
@@ -183,7 +183,7 @@ def inhibit(
         mean_rad: (M modules, 2 populations, A axes).
         reliability: the same shape, 1/rad^2.
         dt_s: time since the last update.
-        config: of the network.
+        config: strengths of the inhibition, and the mode.
         information: E of each module, (M,).
     """
     scale = 1.0 if config.mode == "paper" else dt_s

@@ -1,8 +1,8 @@
 """Grid cells: attractor networks on several tori (modules) of different periods, for the position.
 
-A torus knows a position only up to whole periods. "Sheet" is what we call each of the copies of the plane that it cannot tell
-apart: with one torus, the read-out locks to a wrong sheet once drift exceeds half a period. Modules of unequal periods together
-tell the sheets apart over kilometres (a departure: the paper has a single torus).
+The phases on a torus tell a position only up to whole periods. With a single torus, the read-out is wrong by a period once the
+drift exceeds half a period. Modules of unequal periods together tell the position over kilometres (a departure: the paper has a
+single torus).
 
 Lengths are in the caller's unit: map units while mapping, metres while localizing. An immutable state, and pure functions on it,
 as in ``head_direction``.
@@ -36,7 +36,7 @@ class GridState:
 
 
 def module_periods(smallest: float) -> FloatArray:
-    """Periods (M,) in the ratios ``PERIOD_RATIOS``, in the unit of length of the ``smallest``."""
+    """Periods (M,) of the modules in the ratios ``PERIOD_RATIOS``; ``smallest`` is the first of them, in any unit of length."""
     return smallest * np.array(PERIOD_RATIOS) / PERIOD_RATIOS[0]
 
 
@@ -50,13 +50,13 @@ def information(period: FloatArray, config: AttractorConfig) -> FloatArray:
 
 
 def uniform(period: FloatArray, config: AttractorConfig) -> GridState:
-    """No prior knowledge: all populations as good as flat. ``period`` (M,)."""
+    """The state without prior knowledge: the reliabilities of all populations are at their floor. ``period`` (M,)."""
     flat = np.broadcast_to(config.floor * information(period, config)[:, None, None], (len(period), 2, 2)).copy()
     return GridState(period, np.zeros((len(period), 2, 2)), flat)
 
 
 def known(position: FloatArray, period: FloatArray, config: AttractorConfig) -> GridState:
-    """A known position (2,): the integrators hold the information E, the calibration cells their share of it."""
+    """The state of networks that know their position (2,): the integrators hold E, the calibration cells a share of it."""
     mean = np.repeat(phase(position, period)[:, None, :], 2, axis=1)
     shares = np.array([1.0, config.calibration_share])
     total = information(period, config)[:, None, None] * shares[None, :, None] * np.ones(2)
@@ -79,21 +79,25 @@ def phase_reliability(reliability: FloatArray, period: FloatArray) -> FloatArray
 def _integrate(
     old_mean: FloatArray, old_reliability: FloatArray, period: FloatArray, step: FloatArray, sq_sigma: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """``integrate`` on arrays: new means and reliabilities (M, 2, 2)."""
+    """The compiled part of ``integrate``: returns the new means and reliabilities, each (M modules, 2 populations, 2 axes).
+
+    A displacement becomes a change of phase by the factor 2 pi / period, and a variance by the square of this factor. On an axis
+    to which the motion adds no variance, as in the paper, the reliabilities stay as they are.
+    """
     mean, reliability = np.empty_like(old_mean), old_reliability.copy()
     for m in range(mean.shape[0]):
-        per_length = 2.0 * math.pi / period[m]
+        rad_per_length = 2.0 * math.pi / period[m]
         for a in range(2):
             for p in range(2):
-                mean[m, p, a] = wrap_compiled(old_mean[m, p, a] + step[p, a] * per_length)
+                mean[m, p, a] = wrap_compiled(old_mean[m, p, a] + step[p, a] * rad_per_length)
             if sq_sigma[INTEGRATOR, a] != 0.0 or sq_sigma[CALIBRATION, a] != 0.0:
                 reliability[m, INTEGRATOR, a], reliability[m, CALIBRATION, a] = attractor.forget(
                     old_mean[m, INTEGRATOR, a],
                     old_reliability[m, INTEGRATOR, a],
                     old_mean[m, CALIBRATION, a],
                     old_reliability[m, CALIBRATION, a],
-                    sq_sigma[INTEGRATOR, a] * per_length**2,
-                    sq_sigma[CALIBRATION, a] * per_length**2,
+                    sq_sigma[INTEGRATOR, a] * rad_per_length**2,
+                    sq_sigma[CALIBRATION, a] * rad_per_length**2,
                 )
     return mean, reliability
 
@@ -104,9 +108,9 @@ def integrate(state: GridState, step: FloatArray, sq_sigma: FloatArray) -> GridS
     Each population moves along its own head direction, so that two beliefs in conflict carry a heading each.
 
     Args:
-        state: before the motion.
-        step: displacements (2 populations, 2 axes).
-        sq_sigma: variances that the motion adds, the same shape; the paper adds none, so that zeros are as printed.
+        state: the networks before the motion.
+        step: the displacement of each population on each axis, (2 populations, 2 axes).
+        sq_sigma: the variance that the motion adds to each of these, in length^2, the same shape. The paper adds none: zeros.
     """
     mean, reliability = _integrate(state.mean_rad, state.reliability, state.period, step, sq_sigma)
     return GridState(state.period, mean, reliability)
@@ -125,9 +129,9 @@ def inhibit(state: GridState, dt_s: float, config: AttractorConfig) -> GridState
 
 
 def stimulate(state: GridState, position: FloatArray, reliability: FloatArray) -> GridState:
-    """A view speaks for a position (2,): Eqs. (13)-(14), Li et al. 2025, on the calibration cells alone.
+    """Inject the position (2,) that a recognised view measures into the calibration cells, Eqs. (13)-(14), Li et al. 2025.
 
-    ``reliability`` (2 axes,) is in 1/length^2.
+    The integrators stay as they are. ``reliability`` (2,) is the view's 1/sigma^2 on each axis, in 1/length^2.
     """
     mean, total = state.mean_rad.copy(), state.reliability.copy()
     mean[:, CALIBRATION], total[:, CALIBRATION] = attractor.inject(
@@ -137,7 +141,11 @@ def stimulate(state: GridState, position: FloatArray, reliability: FloatArray) -
 
 
 def inject(state: GridState, position: FloatArray, reliability: FloatArray, config: AttractorConfig) -> GridState:
-    """``stimulate``, Eqs. (13)-(14), Li et al. 2025; in mode "bounded" then ``hand_back``."""
+    """Inject the position (2,) that a recognised view measures, with its reliability (2,) in 1/length^2.
+
+    As printed, Eqs. (13)-(14), Li et al. 2025, change the calibration cells only (``stimulate``). In mode "bounded" the fused
+    belief then goes to both populations (``hand_back``).
+    """
     stimulated = stimulate(state, position, reliability)
     return stimulated if config.mode == "paper" else hand_back(stimulated, config)
 
@@ -160,12 +168,12 @@ def challenge(state: GridState, position: FloatArray, reliability: FloatArray) -
 
 
 def adopt(state: GridState, population: int, config: AttractorConfig) -> GridState:
-    """The conflict is decided: both populations snap to the belief of the winning ``population``."""
+    """End the conflict that ``challenge`` began: both populations take over the belief of ``population``, which has won."""
     return _shared(state, state.mean_rad[:, population], state.reliability[:, population], config)
 
 
 def _shared(state: GridState, mean: FloatArray, total: FloatArray, config: AttractorConfig) -> GridState:
-    """One belief, phases and reliabilities (M, 2), in both populations, its information divided between them."""
+    """The state in which both populations hold the phases ``mean`` (M, 2) and share the reliabilities ``total`` (M, 2)."""
     shares = np.array([1.0 - config.calibration_share, config.calibration_share])
     return GridState(state.period, np.repeat(mean[:, None, :], 2, axis=1), total[:, None, :] * shares[None, :, None])
 
@@ -187,9 +195,9 @@ def read_out(state: GridState, near: FloatArray, reach: float = 0.0) -> tuple[Fl
     The modules hold one and the same belief on different tori, not independent ones: their reliabilities are averaged, not added.
 
     Args:
-        state: of all modules.
-        near: a prior position (2,), which tells the sheet.
-        reach: sheets within this distance of ``near`` are tried; 0 takes the nearest one.
+        state: the networks.
+        near: a prior position (2,), since the phases tell the position only up to whole periods.
+        reach: positions within this distance of ``near`` are tried; 0 takes the nearest one.
 
     Returns:
         Position (2,) and reliability (2,) in 1/length^2.
@@ -207,10 +215,18 @@ def population_belief(state: GridState, population: int, near: FloatArray, reach
 
 
 def decode(mean_rad: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float) -> FloatArray:
-    """Position (2,) whose phases fit those of the modules best, among the sheets within ``reach`` of ``near`` (2,).
+    """The position (2,) that the phases of all modules encode.
 
-    ``mean_rad`` and ``reliability`` (M, 2) are one belief per module. A ``reach`` of 0 takes the sheet nearest to ``near``, as
-    path integration does at every step.
+    Each phase tells the position only up to whole periods. Of the positions that are possible within about ``reach`` of ``near``
+    (2,), the one whose phases fit those of the modules best is returned. A ``reach`` of 0 takes the possible position nearest to
+    ``near``, as after each step of path integration.
+
+    Args:
+        mean_rad: phases (M modules, 2 axes).
+        reliability: reliabilities of the phases, the same shape, 1/rad^2.
+        period: periods of the modules, (M,).
+        near: a prior position, (2,).
+        reach: how far from ``near`` to search, in the unit of the periods.
     """
     position: FloatArray = _decode(mean_rad, reliability, period, near, reach)
     return position
@@ -218,7 +234,7 @@ def decode(mean_rad: FloatArray, reliability: FloatArray, period: FloatArray, ne
 
 @njit(cache=True)
 def _decode(mean: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float) -> FloatArray:
-    """``decode``, axis by axis."""
+    """The compiled part of ``decode``: the two axes are independent of each other, and each is decoded by itself."""
     position = np.empty(2)
     for a in range(2):
         position[a] = _decode_axis(mean, reliability, period, a, near[a], reach)
@@ -227,14 +243,15 @@ def _decode(mean: FloatArray, reliability: FloatArray, period: FloatArray, near:
 
 @njit(cache=True)
 def _decode_axis(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: int, near: float, reach: float) -> float:
-    """Coordinate on axis ``a``: on each sheet of the first module, all modules' weighted mean; that of the least misfit wins.
+    """The coordinate on axis ``a`` that the phases of all modules encode; see ``decode``.
 
-    Equal misfits are decided by the distance from ``near``.
+    The phase of the first module allows one coordinate in each of its periods. From each of these the other modules are unwrapped
+    and averaged with it, and the average that fits all phases best wins. Of equally good ones the nearest to ``near`` wins.
     """
-    sheets = math.ceil(reach / period[0])
+    periods = math.ceil(reach / period[0])
     home = near + wrap_compiled(mean[0, a] - 2.0 * math.pi * near / period[0]) * period[0] / (2.0 * math.pi)
     best, least = near, math.inf
-    for k in range(-sheets, sheets + 1):
+    for k in range(-periods, periods + 1):
         candidate = _weighted_mean(mean, reliability, period, a, home + k * period[0])
         misfit = _misfit(mean, reliability, period, a, candidate)
         if misfit < least or (misfit == least and abs(candidate - near) < abs(best - near)):
@@ -244,19 +261,22 @@ def _decode_axis(mean: FloatArray, reliability: FloatArray, period: FloatArray, 
 
 @njit(cache=True)
 def _weighted_mean(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: int, about: float) -> float:
-    """Least-squares coordinate on axis ``a``, each module's phase unwrapped to the sheet that is nearest to ``about``."""
+    """Mean of the coordinates on axis ``a`` that the modules' phases (M, 2) encode, weighted by their reliabilities (M, 2).
+
+    A phase tells the coordinate only up to whole periods (M,); the possible coordinate nearest to ``about`` is taken.
+    """
     shift, weight = 0.0, 0.0
     for m in range(mean.shape[0]):
-        per_length = 2.0 * math.pi / period[m]
-        information = reliability[m, a] * per_length**2
-        shift += information * wrap_compiled(mean[m, a] - about * per_length) / per_length
+        rad_per_length = 2.0 * math.pi / period[m]
+        information = reliability[m, a] * rad_per_length**2
+        shift += information * wrap_compiled(mean[m, a] - about * rad_per_length) / rad_per_length
         weight += information
     return about + shift / weight
 
 
 @njit(cache=True)
 def _misfit(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: int, coordinate: float) -> float:
-    """Sum over the modules of the squared phase error on axis ``a``, in units of its variance."""
+    """How badly a coordinate on axis ``a`` fits the phases (M, 2): the sum of their squared errors over their variances."""
     total = 0.0
     for m in range(mean.shape[0]):
         total += reliability[m, a] * wrap_compiled(mean[m, a] - 2.0 * math.pi * coordinate / period[m]) ** 2
@@ -267,7 +287,11 @@ def _misfit(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: in
 def _read_out(
     mean_rad: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float
 ) -> tuple[FloatArray, FloatArray]:
-    """``read_out`` on arrays: the fused phases of each module decoded, their reliabilities averaged in 1/length^2."""
+    """The compiled part of ``read_out``: position (2,) and reliability (2,) in 1/length^2.
+
+    In each module the two populations are fused. The position is decoded from the fused phases of all modules, and its
+    reliability is the mean of theirs.
+    """
     modules = len(period)
     mean_f, total, per_axis = np.empty((modules, 2)), np.empty((modules, 2)), np.zeros(2)
     for m in range(modules):

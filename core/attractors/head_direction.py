@@ -25,12 +25,12 @@ class HeadDirectionState:
 
 
 def uniform(config: AttractorConfig) -> HeadDirectionState:
-    """No prior knowledge: both populations as good as flat."""
+    """The state without prior knowledge: the reliabilities of both populations are at their floor."""
     return HeadDirectionState(np.zeros(2), np.full(2, config.floor * config.information))
 
 
 def known(heading_rad: float, config: AttractorConfig) -> HeadDirectionState:
-    """A known heading: the integrator holds the information E, the calibration cells their share of it."""
+    """The state of a network that knows its heading: the integrator holds E, the calibration cells a share of it."""
     reliability = config.information * np.array([1.0, config.calibration_share])
     return HeadDirectionState(np.full(2, wrap_compiled(heading_rad)), reliability)
 
@@ -58,13 +58,20 @@ def inhibit(state: HeadDirectionState, dt_s: float, config: AttractorConfig) -> 
 
 
 def stimulate(state: HeadDirectionState, heading_rad: float, reliability: float) -> HeadDirectionState:
-    """A view speaks for ``heading_rad``: Eqs. (13)-(14), Li et al. 2025, on the calibration cells alone."""
+    """Inject the heading that a recognised view measures into the calibration cells, Eqs. (13)-(14), Li et al. 2025.
+
+    The integrator stays as it is. ``reliability`` is the view's 1/sigma^2, in 1/rad^2.
+    """
     mu_cali, r_cali = attractor.inject(state.mean_rad[CALIBRATION], state.reliability[CALIBRATION], heading_rad, reliability)
     return HeadDirectionState(np.array([state.mean_rad[INTEGRATOR], mu_cali]), np.array([state.reliability[INTEGRATOR], r_cali]))
 
 
 def inject(state: HeadDirectionState, heading_rad: float, reliability: float, config: AttractorConfig) -> HeadDirectionState:
-    """``stimulate``, Eqs. (13)-(14), Li et al. 2025; in mode "bounded" then ``hand_back``."""
+    """Inject the heading that a recognised view measures, with its reliability in 1/rad^2.
+
+    As printed, Eqs. (13)-(14), Li et al. 2025, change the calibration cells only (``stimulate``). In mode "bounded" the fused
+    belief then goes to both populations (``hand_back``).
+    """
     stimulated = stimulate(state, heading_rad, reliability)
     return stimulated if config.mode == "paper" else hand_back(stimulated, config)
 
@@ -80,7 +87,10 @@ def hand_back(state: HeadDirectionState, config: AttractorConfig) -> HeadDirecti
 
 
 def challenge(state: HeadDirectionState, heading_rad: float, reliability: float) -> HeadDirectionState:
-    """The calibration cells take over a conflicting heading; the integrator keeps its own, and the two compete."""
+    """The calibration cells take over a conflicting heading (reliability in 1/rad^2); the integrator keeps its own.
+
+    The two beliefs then compete until one is adopted.
+    """
     return HeadDirectionState(
         np.array([state.mean_rad[INTEGRATOR], wrap_compiled(heading_rad)]),
         np.array([state.reliability[INTEGRATOR], reliability]),
@@ -88,12 +98,15 @@ def challenge(state: HeadDirectionState, heading_rad: float, reliability: float)
 
 
 def adopt(state: HeadDirectionState, population: int, config: AttractorConfig) -> HeadDirectionState:
-    """The conflict is decided: both populations snap to the belief of the winning ``population``; a mean would fit neither."""
+    """End the conflict that ``challenge`` began: both populations take over the belief of ``population``, which has won.
+
+    A mean of the two conflicting headings would be right for neither.
+    """
     return _shared(state.mean_rad[population], state.reliability[population], config)
 
 
 def _shared(heading_rad: float, reliability: float, config: AttractorConfig) -> HeadDirectionState:
-    """One belief in both populations, its information divided between them."""
+    """The state in which both populations hold the same heading, and together the given reliability in 1/rad^2."""
     shares = np.array([1.0 - config.calibration_share, config.calibration_share])
     return HeadDirectionState(np.full(2, heading_rad), reliability * shares)
 

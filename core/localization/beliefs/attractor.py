@@ -33,12 +33,12 @@ from hippodrome.core.localization.beliefs.motion import (
 from hippodrome.core.types import FloatArray
 
 BROADEST_RAD = 1.0  # largest standard deviation of the heading: with a larger one no cross-covariance could be learned
-LEAST_LEFT = 0.5  # share of a variance that one motion must leave: driving back undoes what driving on has added
+LEAST_LEFT = 0.5  # one motion leaves at least this share of a variance, where driving back undoes what driving out has added
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointEstimate:
-    """What one population of cells knows beyond its ring and tori: its place among their repetitions, the scale, covariances."""
+    """What one population of cells knows beyond its ring and tori: the unwrapped position, the scale, and cross-covariances."""
 
     position_m: FloatArray  # (2,) the position, from which its phases on the tori are unwrapped
     log_scale: float  # ln(metres per map unit of this drive)
@@ -51,18 +51,22 @@ class AttractorBelief:
 
     head: HeadDirectionState
     grid: GridState
-    joint: tuple[JointEstimate, JointEstimate]  # of integrators and calibration cells; the same while there is no challenger
+    joint: tuple[JointEstimate, JointEstimate]  # for integrators and calibration cells; equal while there is no challenger
     challenged: bool
     config: BeliefConfig
-    _incumbent: tuple[FloatArray, FloatArray] = field(init=False, repr=False)  # pose (3,), covariance (4, 4): often asked for
+    _incumbent: tuple[FloatArray, FloatArray] = field(init=False, repr=False)  # its pose (3,) and covariance (4, 4)
     keeps_challenger: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
+        """Decode the incumbent's estimate once, as many methods need it; a frozen dataclass allows no plain assignment."""
         object.__setattr__(self, "_incumbent", self._estimate(INTEGRATOR))
 
     @classmethod
     def uniform(cls, start_m: FloatArray, log_scale: float, config: BeliefConfig) -> Self:
-        """No prior knowledge but the map's scale; ``start_m`` (2,) is only a point from which phases are unwrapped."""
+        """The belief before the first observation, which knows only the map's scale.
+
+        ``start_m`` (2,) is only a point from which phases are unwrapped.
+        """
         joint = JointEstimate(start_m, log_scale, np.diag([0.0, 0.0, 0.0, config.motion.scale_prior**2]))
         return cls(
             head=head_direction.uniform(config.head),
@@ -88,7 +92,7 @@ class AttractorBelief:
         return self.joint[INTEGRATOR].log_scale
 
     def activity(self) -> NetworkActivity:
-        """The two networks as they are."""
+        """The state of the two networks, for the estimate that is reported."""
         return network_activity(self.head, self.grid)
 
     def predict(self, motion: Motion) -> Self:
@@ -111,14 +115,19 @@ class AttractorBelief:
         )
 
     def _path_integrated(self, population: int, motion: Motion) -> _PathIntegration:
-        """The motion along the population's own heading, at its own scale, and the variance that it adds."""
+        """What a motion does to one population, which has a heading and a scale of its own.
+
+        A motion usually adds variance, but may also take some away: driving back undoes the error that driving out has added.
+        While the populations agree, this is limited to the share 1 - ``LEAST_LEFT``, so that variances stay positive. While they
+        are in conflict, no variance is taken away.
+        """
         pose, covariance = self._incumbent if population == INTEGRATOR else self._estimate(population)
         joint = self.joint[population]
         heading_rad = float(pose[2])
         predicted = predicted_covariance(covariance, heading_rad, joint.log_scale, motion, self.config.motion)
         variance = np.diag(covariance)[:3]
-        least = np.zeros(3) if self.challenged else (LEAST_LEFT - 1.0) * variance
-        added_variance = np.maximum(np.diag(predicted)[:3] - variance, least)
+        least_added = np.zeros(3) if self.challenged else (LEAST_LEFT - 1.0) * variance
+        added_variance = np.maximum(np.diag(predicted)[:3] - variance, least_added)
         step_m = np.array(displacement_m(heading_rad, joint.log_scale, motion))
         return _PathIntegration(step_m, added_variance, JointEstimate(joint.position_m + step_m, joint.log_scale, predicted))
 
@@ -129,7 +138,10 @@ class AttractorBelief:
         return float(difference @ np.linalg.solve(covariance[:3, :3] + measurement.covariance, difference))
 
     def inject(self, measurement: PoseMeasurement) -> Self:
-        """A measured pose that agrees with the incumbent: Eqs. (13)-(16) and hand-back in each network."""
+        """The belief after a measured pose that agrees with the incumbent; a challenger is dismissed.
+
+        Eqs. (13)-(16), Li et al. 2025, in each network, whose two populations then hold the same belief.
+        """
         settled = self._settled_on(INTEGRATOR) if self.challenged else self
         given = settled._injections(INTEGRATOR, measurement)
         head = head_direction.inject(settled.head, float(given.pose[2]), float(given.reliability[2]), self.config.head)
@@ -139,7 +151,10 @@ class AttractorBelief:
         return replace(settled, head=head, grid=grid, joint=(joint, joint))
 
     def reinforce(self, measurement: PoseMeasurement) -> Self:
-        """A measured pose that agrees with the challenger: Eqs. (13)-(14), no hand-back."""
+        """The belief after a measured pose that agrees with the challenger; the incumbent stays as it is.
+
+        Eqs. (13)-(14), Li et al. 2025, in the calibration cells of each network, which hold the challenger.
+        """
         given = self._injections(CALIBRATION, measurement)
         head = head_direction.stimulate(self.head, float(given.pose[2]), float(given.reliability[2]))
         grid = grid_cells.stimulate(self.grid, given.pose[:2], given.reliability[:2])
@@ -148,23 +163,26 @@ class AttractorBelief:
         return replace(self, head=head, grid=grid, joint=(self.joint[INTEGRATOR], joint))
 
     def _injections(self, population: int, measurement: PoseMeasurement) -> _Injections:
-        """What each network must be given so that Eqs. (13)-(16) bring it to the joint update of all four quantities.
+        """The poses and reliabilities to inject so that Eqs. (13)-(16) bring each network to the joint Kalman update.
 
-        If the joint update leaves the share ``left`` of a variance and shifts the mean by ``shift``, then so does an injection at
-        ``shift / (1 - left)`` from the mean, whose reliability is that of the belief times ``1 / left - 1``.
+        If the Kalman update leaves the share ``left`` of a variance and shifts the mean by ``shift``, then so does the injection
+        of the mean plus ``shift / (1 - left)`` with ``1 / left - 1`` times the reliability of the belief.
         """
         (pose, covariance), joint = self._estimate(population), self.joint[population]
         shift, updated = kalman_update(covariance, innovation(pose, measurement), measurement)
         variance = np.diag(covariance)[:3]
         left = np.diag(updated)[:3] / variance
-        quarter_m = 0.25 * self.grid.period[0]  # farther away an injection could unwrap to a neighbouring repetition of a torus
+        quarter_m = 0.25 * self.grid.period[0]  # an injection farther away could be unwrapped to the next period of a torus
         reach = [quarter_m, quarter_m, 0.5 * math.pi]
         offset = np.clip(shift[:3] / (1.0 - left), np.negative(reach), reach)
         reached = JointEstimate(pose[:2] + shift[:2], joint.log_scale + float(shift[3]), updated)
         return _Injections(pose + offset, (1.0 / left - 1.0) / variance, reached)
 
     def challenge(self, measurement: PoseMeasurement) -> Self:
-        """A measured pose that conflicts: the calibration cells leave for it, with the incumbent's scale."""
+        """The belief after a measured pose that conflicts with it: the calibration cells take this pose over as the challenger.
+
+        The integrators keep the incumbent. The challenger starts with the incumbent's scale, of which the pose tells nothing.
+        """
         position_m, heading_rad = measurement.pose[:2], float(measurement.pose[2])
         variance, incumbent = np.diag(measurement.covariance), self.joint[INTEGRATOR]
         covariance = np.zeros((4, 4))
@@ -178,11 +196,11 @@ class AttractorBelief:
         )
 
     def adopt(self) -> Self:
-        """The challenger has won: the integrators snap to it, and what was learned about the incumbent's errors is dropped."""
+        """The challenger becomes the incumbent: the integrators take its pose over, with its scale and its covariances."""
         return self._settled_on(CALIBRATION)
 
     def _settled_on(self, population: int) -> Self:
-        """The conflict is over: both populations hold what this one believes."""
+        """The belief after a conflict: both populations hold what ``population`` believed, and there is no challenger."""
         return replace(
             self,
             head=head_direction.adopt(self.head, population, self.config.head),
@@ -192,7 +210,7 @@ class AttractorBelief:
         )
 
     def _estimate(self, population: int) -> tuple[FloatArray, FloatArray]:
-        """Pose (3,) and covariance (4, 4): of one population while the two are in conflict, else of both fused."""
+        """Pose (3,) and covariance (4, 4) that a population believes in while the two are in conflict, else the fused ones."""
         joint = self.joint[population]
         if self.challenged:
             heading_rad, r_heading = float(self.head.mean_rad[population]), float(self.head.reliability[population])
@@ -209,15 +227,15 @@ class AttractorBelief:
 class _PathIntegration:
     """What a motion does to one population."""
 
-    step_m: FloatArray  # (2,) displacement
-    added_variance: FloatArray  # (3,) of x, y, heading: m^2, m^2, rad^2
-    joint: JointEstimate  # afterwards
+    step_m: FloatArray  # (2,) displacement to the east and to the north
+    added_variance: FloatArray  # (3,) what is added to the variances of x, y and heading: m^2, m^2, rad^2
+    joint: JointEstimate  # the estimate after the motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Injections:
-    """A measured pose as each network gets it."""
+    """What a measured pose injects into each network."""
 
-    pose: FloatArray  # (3,) means for the tori and the ring
+    pose: FloatArray  # (3,) means for the tori (x, y) and the ring (heading)
     reliability: FloatArray  # (3,) 1/m^2, 1/m^2, 1/rad^2
-    joint: JointEstimate  # afterwards
+    joint: JointEstimate  # the estimate after the injection

@@ -51,7 +51,7 @@ class PoseBelief(Protocol):
         """The belief after a motion of the vehicle."""
 
     def inject(self, measurement: PoseMeasurement) -> Self:
-        """The belief after a measured pose. With a challenger it is the incumbent's, and the challenger is dismissed."""
+        """The belief after a measured pose. A ``CompetingBelief`` updates its incumbent and dismisses the challenger."""
 
     def activity(self) -> NetworkActivity:
         """State of the attractor networks."""
@@ -68,22 +68,22 @@ class CompetingBelief(PoseBelief, Protocol):
         """Squared Mahalanobis distance of a measured pose from the incumbent, or from the challenger."""
 
     def challenge(self, measurement: PoseMeasurement) -> Self:
-        """A measured pose that conflicts with all there is becomes the challenger; the incumbent stays."""
+        """The belief after a measured pose that agrees with neither hypothesis: it becomes the challenger."""
 
     def reinforce(self, measurement: PoseMeasurement) -> Self:
-        """The challenger after a measured pose that agrees with it; the incumbent stays."""
+        """The belief after a measured pose that agrees with the challenger, which it updates; the incumbent stays as it is."""
 
     def adopt(self) -> Self:
         """The challenger becomes the incumbent."""
 
 
 def competes(belief: PoseBelief) -> TypeGuard[CompetingBelief]:
-    """Whether the belief is one with a challenger."""
+    """Whether the belief keeps a challenger beside its incumbent."""
     return belief.keeps_challenger
 
 
 def network_activity(head: HeadDirectionState, grid: GridState) -> NetworkActivity:
-    """The activity of a belief that is held by networks."""
+    """What a belief held by attractor networks reports of them."""
     return NetworkActivity(head.mean_rad, head.reliability, grid.mean_rad, grid.reliability)
 
 

@@ -20,7 +20,7 @@ from hippodrome.core.localization.beliefs.motion import (
 from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
-UNKNOWN = np.diag([1e8, 1e8, 1e2])  # m^2, m^2, rad^2: no prior knowledge of the pose
+UNKNOWN = np.diag([1e8, 1e8, 1e2])  # covariance of an unknown pose: m^2, m^2, rad^2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +42,7 @@ class KalmanBelief:
 
     @classmethod
     def uniform(cls, start_m: FloatArray, log_scale: float, config: BeliefConfig) -> Self:
-        """No prior knowledge but the map's scale; ``start_m`` (2,) is the mean of a flat belief."""
+        """The belief before the first observation, which knows only the map's scale; ``start_m`` (2,) is its mean position."""
         covariance = np.zeros((4, 4))
         covariance[:3, :3], covariance[3, 3] = UNKNOWN, config.motion.scale_prior**2
         return cls(Gaussian(np.array([start_m[0], start_m[1], 0.0, log_scale]), covariance), None, config)
@@ -54,12 +54,12 @@ class KalmanBelief:
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance (3, 3) of ``pose``."""
+        """Covariance (3, 3) of ``pose``: m, m, rad."""
         return self.incumbent.covariance[:3, :3].copy()
 
     @property
     def log_scale(self) -> float:
-        """ln(metres per map unit of this drive)."""
+        """The incumbent's mean of ln(metres per map unit of this drive)."""
         return float(self.incumbent.mean[3])
 
     @property
@@ -68,11 +68,11 @@ class KalmanBelief:
         return self.challenger is not None
 
     def activity(self) -> NetworkActivity:
-        """The heading alone: a filter has no networks."""
+        """The incumbent's heading; a Kalman filter has no attractor networks to report."""
         return no_networks(self.incumbent.mean[2], self.incumbent.covariance[2, 2])
 
     def predict(self, motion: Motion) -> Self:
-        """Both hypotheses moved."""
+        """The prediction step of the filter for the incumbent and, if there is one, for the challenger."""
         challenger = None if self.challenger is None else _predicted(self.challenger, motion, self.config)
         return replace(self, incumbent=_predicted(self.incumbent, motion, self.config), challenger=challenger)
 
@@ -83,17 +83,17 @@ class KalmanBelief:
         return float(difference @ np.linalg.solve(belief.covariance[:3, :3] + measurement.covariance, difference))
 
     def inject(self, measurement: PoseMeasurement) -> Self:
-        """Measurement update of the incumbent; the challenger is dismissed."""
+        """The measurement update of the incumbent, with which the measured pose agrees; the challenger is dismissed."""
         return replace(self, incumbent=_updated(self.incumbent, measurement), challenger=None)
 
     def challenge(self, measurement: PoseMeasurement) -> Self:
-        """A measured pose that conflicts becomes the challenger, with the incumbent's scale."""
+        """A measured pose that conflicts with the belief becomes the challenger, with the incumbent's scale."""
         covariance = np.zeros((4, 4))
         covariance[:3, :3], covariance[3, 3] = measurement.covariance, self.incumbent.covariance[3, 3]
         return replace(self, challenger=Gaussian(np.append(measurement.pose, self.incumbent.mean[3]), covariance))
 
     def reinforce(self, measurement: PoseMeasurement) -> Self:
-        """Measurement update of the challenger."""
+        """The measurement update of the challenger, with which the measured pose agrees; the incumbent stays as it is."""
         return replace(self, challenger=None if self.challenger is None else _updated(self.challenger, measurement))
 
     def adopt(self) -> Self:
@@ -102,7 +102,7 @@ class KalmanBelief:
 
 
 def _predicted(belief: Gaussian, motion: Motion, config: BeliefConfig) -> Gaussian:
-    """The belief after a motion along its own heading, at its own scale."""
+    """The Kalman prediction of one hypothesis, which moves along its own heading and at its own scale."""
     x_m, y_m, heading_rad, log_scale = belief.mean.tolist()
     east_m, north_m = displacement_m(heading_rad, log_scale, motion)
     mean = np.array([x_m + east_m, y_m + north_m, wrap_compiled(heading_rad + motion.turned_rad), log_scale])
@@ -110,7 +110,7 @@ def _predicted(belief: Gaussian, motion: Motion, config: BeliefConfig) -> Gaussi
 
 
 def _updated(belief: Gaussian, measurement: PoseMeasurement) -> Gaussian:
-    """The belief after a measured pose."""
+    """The Kalman update of one hypothesis by a measured pose."""
     shift, covariance = kalman_update(belief.covariance, innovation(belief.mean[:3], measurement), measurement)
     mean = belief.mean + shift
     mean[2] = wrap_compiled(mean[2])

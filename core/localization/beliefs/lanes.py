@@ -91,7 +91,7 @@ class LaneBelief:
         return covariance
 
     def activity(self) -> NetworkActivity:
-        """The heading alone: a filter has no networks."""
+        """The heading; a histogram filter has no attractor networks to report."""
         return no_networks(self.heading_rad, self.sq_heading)
 
     def _read_out(self) -> tuple[FloatArray, FloatArray]:
@@ -115,7 +115,10 @@ class LaneBelief:
         return turned._moved() if due else turned
 
     def _moved(self) -> Self:
-        """The bins moved by what was driven, the scales wandered, and the bins weighted by how well they fit the heading."""
+        """The prediction step: bins are moved by what was driven and weighted by how well they fit the heading.
+
+        The probability also diffuses between neighbouring scales, and a little of it goes to all bins.
+        """
         graph, noise, driven = self.graph, self.config.motion, self.waiting
         sigma = noise.speed * math.sqrt(max(driven.dt_s, 1e-9)) / max(driven.dt_s, 1e-9)  # relative, of the distance
         reach = _Reach(graph.reach_start, graph.reach_bin, graph.reach_m, graph.reach_changes)
@@ -131,7 +134,7 @@ class LaneBelief:
         return replace(self, probability=kept + (ANYWHERE if total > 0.0 else 1.0) * anywhere, waiting=Motion(0.0, 0.0, 0.0))
 
     def inject(self, measurement: PoseMeasurement) -> Self:
-        """Bayes' rule for bins and scales, a scalar Kalman update for the heading."""
+        """The belief after a measured pose: Bayes' rule for bins and scales, a scalar Kalman update for the heading."""
         due = self.waiting.travelled * math.exp(self.log_scale) >= BIN_M
         moved = self._moved() if due else self
         probability = moved.probability * moved._likelihood(measurement)[None, :]
@@ -158,7 +161,7 @@ class LaneBelief:
 
 
 def _anywhere(probability: FloatArray) -> FloatArray:
-    """The scales (S, N) as they are believed, the bins all alike."""
+    """Probabilities (S, N) that keep the belief about the scale but spread it evenly over all bins."""
     flat: FloatArray = np.repeat(probability.sum(axis=1, keepdims=True) / probability.shape[1], probability.shape[1], axis=1)
     return flat
 
@@ -191,6 +194,6 @@ def _moved_ahead(probability: FloatArray, driven_m: FloatArray, sigma: float, re
 
 @njit(cache=True)
 def _fit(distance_m: float, driven_m: float, spread_m: float) -> float:
-    """Gaussian of the difference, cut off at three standard deviations ``spread_m``."""
+    """How well a distance fits the driven one: a Gaussian of the difference, 0 beyond three standard deviations ``spread_m``."""
     off = (distance_m - driven_m) / spread_m
     return math.exp(-0.5 * off * off) if abs(off) < 3.0 else 0.0

@@ -1,8 +1,8 @@
 """Mode "paper": the printed networks on one torus, to show what they do and where they fail.
 
-Nothing moves from calibration to integrator cells, reliabilities are forced to sum to E at every tick, and the torus may lock to
-a wrong repetition: see the departures named in ``core.attractors.attractor``. The scale stays that of the map, as in the paper,
-where both drives are one.
+Nothing moves from calibration to integrator cells, reliabilities are forced to sum to E at every tick, and the position on the
+torus may be wrong by whole periods: see the departures named in ``core.attractors.attractor``. The scale stays that of the map,
+as in the paper, where both drives are one.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ class PaperBelief:
     grid: GridState
     position_m: FloatArray  # (2,) the read-out of the torus, unwrapped from tick to tick
     log_scale: float  # ln(metres per map unit), never learned
-    placed: bool  # whether it is known which repetition of the torus the vehicle is on: the first measured pose tells
+    placed: bool  # whether it is known in which period of the torus the vehicle is: the first measured pose tells
     config: BeliefConfig
     keeps_challenger: ClassVar[bool] = False
 
     @classmethod
     def uniform(cls, start_m: FloatArray, log_scale: float, config: BeliefConfig) -> Self:
-        """No prior knowledge; ``start_m`` (2,) is only a point from which phases are unwrapped."""
+        """The belief before the first observation; ``start_m`` (2,) is only a point from which phases are unwrapped."""
         head = head_direction.uniform(config.paper.head)
         grid = grid_cells.uniform(np.array([config.paper.period_m]), config.paper.grid)
         return cls(head, grid, start_m, log_scale, False, config)
@@ -54,11 +54,14 @@ class PaperBelief:
         return np.diag([1.0 / r_position[0], 1.0 / r_position[1], 1.0 / r_heading])
 
     def activity(self) -> NetworkActivity:
-        """The two networks as they are."""
+        """The state of the two networks, for the estimate that is reported."""
         return network_activity(self.head, self.grid)
 
     def predict(self, motion: Motion) -> Self:
-        """Path integration, mutual inhibition, global inhibition."""
+        """Path integration of a motion, then mutual and global inhibition, first in the ring and then in the torus.
+
+        The torus is moved along the heading that is read out of the ring. As in the paper, the motion adds no variance.
+        """
         head = head_direction.integrate(self.head, motion.turned_rad / motion.dt_s, motion.dt_s)
         head = head_direction.inhibit(head, motion.dt_s, self.config.paper.head)
         heading_rad, _ = head_direction.read_out(head)
@@ -69,7 +72,10 @@ class PaperBelief:
         return replace(self, head=head, grid=grid, position_m=position_m)
 
     def inject(self, measurement: PoseMeasurement) -> Self:
-        """Eqs. (13)-(14), Li et al. 2025, with a fixed share of E for reliability; the measurement's covariance is not used."""
+        """Inject a measured pose by Eqs. (13)-(14), Li et al. 2025.
+
+        Its reliability is a fixed share of E (``strength``); the measurement's covariance is not used.
+        """
         paper = self.config.paper
         head = head_direction.stimulate(self.head, float(measurement.pose[2]), paper.strength * paper.head.information)
         per_length = (grid_cells.TURN / paper.period_m) ** 2

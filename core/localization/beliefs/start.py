@@ -13,7 +13,7 @@ from hippodrome.core.types import FloatArray, HippodromeError
 
 
 def start_belief(start_m: FloatArray, log_scale: float, network: RoadNetwork | None, config: BeliefConfig) -> PoseBelief:
-    """No prior knowledge of the pose.
+    """The belief before the first observation, which knows nothing of the pose.
 
     Args:
         start_m: any point of the map (2,), from which phases are unwrapped.

@@ -14,14 +14,16 @@ from hippodrome.core.types import FloatArray
 
 
 def relation_of(measurement: PoseMeasurement, belief: PoseBelief, adopted: bool, gate: float) -> Relation:
-    """What a measured pose agrees with.
+    """Which hypothesis of the belief a measured pose agrees with.
+
+    A measurement in the same place as the incumbent agrees with it at any Mahalanobis distance: the difference is then noise,
+    and no sign of another hypothesis.
 
     Args:
         measurement: the measured pose.
-        belief: the belief before it.
+        belief: the belief before the measurement.
         adopted: whether the belief has an incumbent yet.
-        gate: squared Mahalanobis distance up to which a measurement agrees with a hypothesis. With the incumbent it agrees also
-            if it lies in the same place: then noise divides them, not another hypothesis.
+        gate: squared Mahalanobis distance up to which a measurement agrees with a hypothesis.
     """
     if not competes(belief):
         return Relation.ALL_HYPOTHESES
@@ -35,7 +37,7 @@ def relation_of(measurement: PoseMeasurement, belief: PoseBelief, adopted: bool,
 def updated(
     belief: PoseBelief, measurement: PoseMeasurement, relation: Relation, challenger_wins: bool, gate: float
 ) -> PoseBelief:
-    """The belief after a measured pose that stands in this relation to it."""
+    """The belief after a measured pose, which counts for the hypothesis that it agrees with (``relation``)."""
     if not competes(belief):
         return belief.inject(measurement)
     if relation is Relation.INCUMBENT:
@@ -47,9 +49,9 @@ def updated(
 
 
 def _bounded(measurement: PoseMeasurement, belief: CompetingBelief, gate: float) -> PoseMeasurement:
-    """A measurement beyond the gate with its covariance grown by the excess, so that an outlier moves the incumbent little.
+    """The measurement, its covariance enlarged if it lies beyond the gate, so that an outlier moves the incumbent little.
 
-    This is the robust weight of Student's distribution: it falls with the squared distance.
+    The factor is the squared Mahalanobis distance over the gate, as in a robust weight that falls with the squared distance.
     """
     excess = max(1.0, belief.sq_distance(measurement) / gate)
     covariance: FloatArray = excess * measurement.covariance

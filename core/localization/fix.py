@@ -45,7 +45,7 @@ import numpy as np
 from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.types import FloatArray, LocalizationStatus
 
-LATERAL_SHARE = 0.1  # weight of a new view in the running mean of lateral disagreement: a memory of some 30 m
+LATERAL_SHARE = 0.1  # weight of a new view in the running mean of ``sq_lateral_m2``: a memory of some 30 m
 
 
 class Relation(Enum):
@@ -90,20 +90,23 @@ class RecognisedView:
 
 @dataclass(frozen=True, slots=True)
 class PlaceCheck:
-    """The believed place, held against the map and a query frame."""
+    """How the believed place compares with the map, the road network and a query frame."""
 
-    on_map: bool  # whether cells of the map lie around it
-    may_be_on_road: bool  # whether a road of the network does
-    z_score: float | None  # of the best of those cells in this frame; None: none was scored
+    on_map: bool  # whether view cells of the map lie around the believed place
+    may_be_on_road: bool  # whether a road of the network may lie there
+    z_score: float | None  # best z-score of those cells in this frame; None: none of them was scored
 
 
 def faded(fix: Fix, config: LocalizerConfig) -> Fix:
-    """The evidence so far, one query frame later."""
+    """The fix one query frame later: the evidence so far counts less by the factor ``evidence_memory``."""
     return replace(fix, support=config.evidence_memory * fix.support, challenge=config.evidence_memory * fix.challenge)
 
 
 def recognised(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
-    """A recognised view counts for the hypothesis that it agrees with; if there is none, it begins a new challenge."""
+    """The fix after a recognised view: its evidence counts for the hypothesis that it agrees with.
+
+    A view that agrees with no hypothesis begins a new challenge.
+    """
     if view.relation is Relation.ALL_HYPOTHESES:
         total = fix.total + view.margin
         return replace(fix, adopted=total >= config.fix_evidence, total=total, map_covariance=view.map_covariance)
@@ -122,7 +125,11 @@ def challenger_wins(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> 
 
 
 def _supported(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
-    """A view that agrees with the incumbent ends any challenge. Support is bounded, so that a challenger can win at all."""
+    """The fix after a view that agrees with the incumbent: the incumbent gains evidence, and any challenge is over.
+
+    The incumbent's evidence is bounded by ``fix_evidence``, as otherwise no challenger could ever gather more. The squared
+    lateral disagreement of the view goes into a running mean, which later becomes part of the reported covariance.
+    """
     return replace(
         fix,
         support=min(fix.support + view.evidence, config.fix_evidence),
@@ -134,7 +141,10 @@ def _supported(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
 
 
 def _adopted(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
-    """The challenger becomes the incumbent with the evidence that it has; the new place was not held against a frame yet."""
+    """The fix after the challenger was adopted: it becomes the incumbent and keeps the evidence that it has gathered.
+
+    The z-score of the believed place is forgotten, as no frame has been compared with the new place yet.
+    """
     return replace(
         fix,
         adopted=True,
@@ -147,9 +157,10 @@ def _adopted(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
 
 
 def checked(fix: Fix, check: PlaceCheck, config: LocalizerConfig) -> Fix:
-    """Where the map shows the believed place, a frame has to be like it, whatever else the frame is like.
+    """The fix after the believed place was compared with the map and with a query frame.
 
-    A place that was just adopted is on the map, as a view cell has named it.
+    Where the map has view cells around the believed place, the frame must resemble them: their z-score goes into a running mean,
+    and a low mean makes the fix doubted. A place that was just adopted counts as on the map, since a view cell has named it.
     """
     on_map = check.on_map or fix.place_z is None
     return replace(

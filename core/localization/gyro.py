@@ -27,15 +27,16 @@ class GyroNoise:
 
 
 def update(state: GyroNoise, yaw_rate_radps: float, least_radps: float) -> GyroNoise:
-    """Take one yaw rate in.
+    """The estimate of the gyro's noise after one more yaw rate.
 
-    Sigma takes a step towards the value at which the second differences lie above and below their median equally often. The few
-    samples at the beginning of a turn, which no smooth motion explains, hardly move a median.
+    Sigma grows or shrinks by a small step, whether the new second difference is larger or smaller than its median would be in
+    white noise of this sigma. So it tends to the sigma at which half of them are larger. The few samples at the beginning of a
+    turn, which no smooth motion explains, hardly move a median.
 
     Args:
         state: the estimate so far.
         yaw_rate_radps: the new sample.
-        least_radps: sigma is never taken to be smaller.
+        least_radps: lower bound of sigma.
     """
     sigma = max(state.sigma_radps, least_radps)
     if state.samples >= 2:

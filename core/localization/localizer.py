@@ -93,7 +93,10 @@ class Localizer:
         self._fix = Fix()
 
     def step(self, observation: Observation) -> LocalizationEstimate:
-        """Take one observation in; returns the estimate at its time."""
+        """Take one observation in and return the estimate at its time.
+
+        The first frame, and every later frame for which the view has changed enough, is searched for in the map.
+        """
         observation = observation if self._odometry is None else self._odometry.step(observation)
         self._predict(observation)
         if observation.frame is not None and (self._match is None or keyframes.is_due(self._view_change, self._config.steps)):
@@ -112,7 +115,10 @@ class Localizer:
         self._since_query = Step(self._since_query.length + travelled_m, self._since_query.turn_rad + turned_rad)
 
     def _query(self, frame: Frame) -> None:
-        """Recognise the place that a query frame shows, and update belief and fix."""
+        """Recognise the place that a query frame shows, and update the pose belief and the fix with it.
+
+        A frame close to the query frame before shows nearly the same and counts less.
+        """
         config, believed = self._config, self._believed_cells()
         match = self._recogniser.recognise(frame, self._since_query, believed)
         weight = 1.0 if self._match is None else min(1.0, self._since_query.length / config.independent_m)
@@ -125,24 +131,28 @@ class Localizer:
             self._fix = checked(self._fix, self._place_check(match, believed), config)
 
     def _believed_cells(self) -> IntArray:
-        """Cells of the believed place; none without a fix or off the map."""
+        """View cells around the believed place; none before the first fix, or where the map does not reach."""
         if not self._fix.adopted:
             return np.zeros(0, dtype=np.int32)
         return cells_around(self._places, self._belief.pose, _sigma_m(self._belief.covariance))
 
     def _measurement(self, match: PlaceMatch) -> PoseMeasurement:
-        """The pose of a recognised cell.
+        """The pose of the recognised view cell as a measurement, with a covariance along and across the road.
 
-        Beyond the end of a mapped road its last cell still looks most alike, from as far off as two cells may be linked.
+        Frames taken beyond the end of a mapped road still resemble its last cell most, up to the length of the longest link
+        between cells. For such a cell the standard deviation along the road is therefore as large as that.
         """
         noise, pose = self._config.injection, self._recogniser.pose(match)
         along_m = LINK_REACH_M if self._places.at_end[match.cell] else noise.along_m
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
-        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        return PoseMeasurement(pose, turn @ np.diag([along_m**2, noise.across_m**2, noise.heading_rad**2]) @ turn.T)
+        rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        return PoseMeasurement(pose, rotation @ np.diag([along_m**2, noise.across_m**2, noise.heading_rad**2]) @ rotation.T)
 
     def _take(self, measurement: PoseMeasurement, match: PlaceMatch, weight: float) -> None:
-        """Put a measured pose into the belief and its evidence into the fix; ``weight``: how much new the frame could show."""
+        """Put a measured pose into the belief and its evidence into the fix.
+
+        ``weight`` (0 to 1) is the share of the frame that is new compared with the query frame before.
+        """
         config, belief, gate = self._config, self._belief, self._config.injection.gate
         relation = relation_of(measurement, belief, self._fix.adopted, gate)
         sq_lateral_m2 = _sq_lateral_m2(belief.pose, measurement.pose)
@@ -151,7 +161,11 @@ class Localizer:
         self._fix = recognised(self._fix, view, config)
 
     def _place_check(self, match: PlaceMatch, believed: IntArray) -> PlaceCheck:
-        """Hold the believed place, as it was before the frame, against the map and the frame."""
+        """Compare the believed place with the map and with the query frame, to find out whether the belief may be wrong.
+
+        ``believed`` are the view cells around the place that was believed before the frame was used; ``match`` has their
+        similarity to the frame. Without such cells the place is off the map, but may still lie on a road of the network.
+        """
         pose, sigma_m = self._belief.pose, _sigma_m(self._belief.covariance)
         on_map = len(believed) > 0
         scored = match.scored
@@ -164,7 +178,11 @@ class Localizer:
         )
 
     def _estimate(self, t_s: float) -> LocalizationEstimate:
-        """The answer: the belief's read-out, to whose covariance is added what averaging over views does not take away."""
+        """The estimate that is reported: pose and covariance of the belief, and the status of the fix.
+
+        Errors of the map and lateral errors are the same in many views, so that averaging over views does not reduce them. The
+        belief does not know this; their covariances are added here.
+        """
         pose, covariance = self._belief.pose, self._belief.covariance
         state = status(self._fix, _sigma_m(covariance), self._config)
         activity = self._belief.activity()
@@ -183,29 +201,31 @@ class Localizer:
         )
 
     def _lateral_covariance(self, heading_rad: float) -> FloatArray:
-        """Covariance (3, 3) of lateral errors that views repeat for tens of metres, so that averaging does not take them away.
+        """Covariance (3, 3) of lateral errors that stay alike for tens of metres, so that averaging over views does not help.
 
-        Drivers wander in their lanes, which views hardly show. A drifting heading carries the pose along, and views disagree.
+        One is the wander of drivers in their lanes, which views hardly show. The other is the lateral disagreement of the views
+        with the belief, which grows where the heading drifts.
         """
         left = np.array([-math.sin(heading_rad), math.cos(heading_rad), 0.0])
         return (self._config.injection.wander_m**2 + self._fix.sq_lateral_m2) * np.outer(left, left)
 
 
 def _sq_lateral_m2(believed: FloatArray, measured: FloatArray) -> float:
-    """Squared distance of a measured pose (3,) from the line of travel through the believed one, at most that of a lane."""
+    """Squared distance of a measured pose (3,) from the line of travel through the believed one, at most ``LANE_M`` squared."""
     east_m, north_m = measured[:2] - believed[:2]
     return min(float(north_m * math.cos(believed[2]) - east_m * math.sin(believed[2])) ** 2, LANE_M**2)
 
 
 def _sigma_m(covariance: FloatArray) -> float:
-    """Standard deviation of the position, the mean over directions."""
+    """Standard deviation of the position in metres: the root of its mean variance over all directions."""
     return float(np.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])))
 
 
 def _expected_log_scale(cognitive_map: CognitiveMap, config: LocalizerConfig) -> float:
-    """ln(metres per map unit) before anything is known of this drive.
+    """ln(metres per map unit) that is assumed before anything is known of this drive.
 
-    Wheels have the same unit in both drives, so that it is the map's. Visual odometry measures in metres, by the camera's height.
+    Wheels measure in the same unit in both drives, so that the scale of the map is assumed. Visual odometry measures in metres,
+    as the height of the camera is known, so that the scale is 1.
     """
     if config.self_motion == "visual" or cognitive_map.log_scale is None:
         return 0.0

@@ -71,17 +71,23 @@ class PlaceRecogniser:
         return PlaceMatch(scored, cell, margin(places, self._filtered, cell))
 
     def z_score(self, scored: ScoredViews, similarity: Float32Array | float) -> Float32Array | float:
-        """How far a similarity lies above the mean of all cells, in their standard deviations."""
+        """How many standard deviations a similarity lies above the mean over all cells of the map."""
         return (similarity - scored.mean) / max(scored.spread, self._spread_floor)
 
     def pose(self, match: PlaceMatch) -> FloatArray:
-        """Pose (3,) of the recognised cell, interpolated between views."""
-        similarity = np.full(len(self._places.poses_m), np.nan, dtype=np.float32)
+        """Pose (3,) in metres and rad at which the query frame was taken, judged by the recognised cell and its two neighbours.
+
+        The pose is interpolated between the cells by their similarities to the frame.
+        """
+        similarity = np.full(len(self._places.poses_m), np.nan, dtype=np.float32)  # nan: the cell was not scored
         similarity[match.scored.cells] = match.scored.similarity
         return interpolated_pose(self._places, similarity, match.cell)
 
     def _evidence(self, scored: ScoredViews, driven: Step) -> Float32Array:
-        """Sequence evidence (C,) after a query frame; too few cells make no statistics, and get z-scores of zero."""
+        """Sequence evidence (C,) of all cells after a query frame, from the z-scores of the cells that were scored.
+
+        In a map of too few cells their standard deviation means nothing, and all z-scores are taken as zero.
+        """
         sequence, places = self._config.sequence, self._places
         enough = len(places.poses_m) >= sequence.min_cells
         z = self.z_score(scored, scored.similarity) if enough else np.zeros_like(scored.similarity)

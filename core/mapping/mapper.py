@@ -62,7 +62,10 @@ class Mapper:
         self._neural_at: list[NeuralPose] = []  # the networks at each keyframe, once they have started
 
     def step(self, observation: Observation) -> None:
-        """Take one observation: path integration, and a keyframe where one is due and there is a frame."""
+        """Take one observation in: integrate its motion, and make a keyframe of its frame if one is due.
+
+        A keyframe whose place is recognised, perhaps together with keyframes shortly before it, closes loops.
+        """
         self._since_keyframe = keyframes.advance(self._since_keyframe, observation, self._config.view_step)
         self._integrate_paths(observation)
         if not keyframes.is_due(self._since_keyframe, self._config.view_step) or observation.frame is None:
@@ -73,10 +76,12 @@ class Mapper:
         self._since_keyframe = keyframes.restart(self._since_keyframe)
 
     def finish(self) -> CognitiveMap:
-        """The semi-metric cognitive map of everything seen.
+        """The semi-metric cognitive map of all observations so far, with its poses relaxed.
+
+        If the drive was too short for the attractor networks to start, their states are those of dead reckoning.
 
         Raises:
-            MappingError: the vehicle never moved with a frame in view.
+            MappingError: no keyframe was made, as there was no frame while the vehicle moved.
         """
         if not self._t_s:
             raise MappingError("the drive has no view: no frame was taken while the vehicle moved")
@@ -97,13 +102,13 @@ class Mapper:
         )
 
     def _integrate_paths(self, observation: Observation) -> None:
-        """The motion of one observation into the networks, once they run."""
+        """Move the beliefs of the attractor networks by the motion of one observation, once the networks have started."""
         if self._neural is not None:
             motion = keyframes.arc_motion(observation.speed * observation.dt_s, observation.yaw_rate_radps * observation.dt_s)
             self._neural = networks.path_integrate(self._neural, motion, observation.dt_s, self._config.attractor)
 
     def _add_keyframe(self, t_s: float, frame: Frame) -> list[Recognition]:
-        """A new vertex; returns what places its view recognises."""
+        """Make a keyframe, which becomes a new vertex; returns the recognitions of known places that its view triggers."""
         state, vertex = self._since_keyframe, len(self._t_s)
         self._t_s.append(t_s)
         self._motions.append(state.motion if vertex else np.zeros(3))
@@ -111,16 +116,16 @@ class Mapper:
         return self._memory.recognise(vertex, descriptor, state.travelled, float(state.motion[2]), state.spacing)
 
     def _close_loops(self, recognitions: list[Recognition]) -> None:
-        """A loop closure for each recognition, from the vertex that made the view cell to the one that was recognised."""
+        """Add a loop closure for each recognition, from the vertex that made the view cell to the vertex that recognised it."""
         for found in recognitions:
             source, motion = self._memory.cell_vertex[found.cell], (found.along, 0.0, found.heading_rad)
             self._closures.append(Closure(source, found.vertex, motion, self._since_keyframe.spacing, found.margin))
 
     def _reactivate(self, recognitions: list[Recognition]) -> None:
-        """The networks at this keyframe: started, or corrected by the view cell of its place, and recorded.
+        """Start the attractor networks, or correct them by the place that this keyframe recognised; then record their state.
 
-        They start with the first keyframe at which the memory could recognise a place. A recognised place then injects the pose
-        that the networks had when its view cell was made, moved by where the keyframe lies from there.
+        The networks start with the first keyframe at which the memory can recognise a place. A recognised place injects a pose:
+        the one that the networks had when the place's view cell was made, composed with the pose of the keyframe seen from there.
         """
         if self._neural is None and self._memory.can_recognise:
             self._neural_at = self._reckoned_states()
@@ -134,7 +139,11 @@ class Mapper:
             self._neural_at.append(self._neural)
 
     def _reckoned_states(self) -> list[NeuralPose]:
-        """The networks at every keyframe so far, from dead reckoning alone."""
+        """The states that the networks would have had at every keyframe so far, from dead reckoning alone.
+
+        The map stores a state for every vertex, also for those before the networks have started. Until then no view could correct
+        them, so that dead reckoning is all that they would have known.
+        """
         poses = se2.integrate(np.zeros(3), np.stack(self._motions))
         return [networks.begin(pose, self._since_keyframe.spacing, self._config.attractor) for pose in poses]
 

@@ -72,9 +72,9 @@ class _PendingView:
 
     vertex: int
     descriptor: Descriptor
-    travelled: float  # since the keyframe before, map units
-    turned_rad: float  # since the keyframe before
-    scores: Float32Array  # (C, shifts) against the cells stored at that time
+    travelled: float  # way since the keyframe before, map units
+    turned_rad: float  # turn since the keyframe before
+    scores: Float32Array  # (C, shifts) similarity to each cell stored at that time, at each sideways shift
     evidence: Evidence
     cell: int = -1  # the cell that the view was recognised as; -1: none, so that it will get one of its own
 
@@ -101,7 +101,7 @@ class PlaceMemory:
     def recognise(
         self, vertex: int, descriptor: Descriptor, travelled: float, turned_rad: float, spacing: float
     ) -> list[Recognition]:
-        """What places the view of a new keyframe recognises; the keyframe's view is then pending.
+        """Recognise known places by the view of a new keyframe, which is then pending (see the module).
 
         Args:
             vertex: number of the keyframe's vertex; numbers count up.
@@ -125,13 +125,16 @@ class PlaceMemory:
         return found
 
     def finish(self, spacing: float) -> ViewCells:
-        """Store what is still pending; the view cells of the finished map."""
+        """Store all views that are still pending, and return the view cells of the finished map.
+
+        ``spacing`` is the present way between two keyframes, map units.
+        """
         while self._pending:
             self._store_oldest(spacing)
         return self._views.finished()
 
     def _filtered_evidence(self, scores: Float32Array, travelled: float, turned_rad: float, spacing: float) -> Evidence:
-        """The scores (C, shifts) of a view as z-scores, filtered along the graph with the evidence of the view before."""
+        """Sequence evidence for all cells after a new view: its scores (C, shifts) as z-scores, plus the evidence before it."""
         sequence = self._config.sequence
         floor = sequence.sigma_floor if self._config.view_cells.kind == "gradient" else sequence.grey_sigma_floor
         z = standardise(scores.max(axis=1), sequence.min_cells, floor)
@@ -139,7 +142,11 @@ class PlaceMemory:
         return filter_step(before, z, self._graph.links, travelled, turned_rad, spacing, sequence)
 
     def _needed_margin(self, best: Peak) -> float:
-        """The margin that the best cell needs: less where the keyframe before was recognised and its cell leads to this one."""
+        """The margin that the best cell needs to be recognised.
+
+        It is smaller where the evidence comes from the cell that the keyframe before was recognised as, since the vehicle then
+        drives on along a known road.
+        """
         latest = self._pending[-1]
         came_from = latest.evidence.predecessor[best.cell] if best.cell >= 0 else -1
         continues = came_from >= 0 and len(self._pending) > 1 and self._pending[-2].cell == came_from
@@ -161,15 +168,20 @@ class PlaceMemory:
         return found[::-1]
 
     def _recognition(self, view: _PendingView, margin: float) -> Recognition:
-        """The recognition of a view as its cell; a view that looks further right than the cell has its heading to the right."""
+        """The recognition of a view as its cell, with the pose of the view relative to the cell.
+
+        The heading follows from the sideways shift at which view and cell are most alike: a view that shows what lies further
+        right than the cell does was taken with the vehicle heading to the right.
+        """
         shift = peak_shift(view.scores[view.cell])
         along = self._along(view)
         return Recognition(view.vertex, view.cell, margin, along, -shift * self._config.column_rad)
 
     def _along(self, view: _PendingView) -> float:
-        """Map units that a view lies ahead of its cell: where the parabola through the scores of three cells in a row peaks.
+        """How far, in map units, a view lies ahead of its cell along the road, more finely than cells are spaced.
 
-        The three are the cell, the one before it and the one after it on the road; 0 where one of them is missing.
+        It is the place at which the parabola through the scores of three cells peaks: the cell, the one before it and the one
+        after it on the road. It is 0 where one of them is missing.
         """
         links, best = self._graph.links, view.scores.max(axis=1)
         into, out_of = int(links.last_in[view.cell]), int(links.last_out[view.cell])
@@ -182,7 +194,10 @@ class PlaceMemory:
         return peak_of_values(behind, best[before], best[view.cell], ahead, best[after])
 
     def _store_oldest(self, spacing: float) -> None:
-        """Store the oldest pending view, as a cell of its own unless it was recognised, and link its cell to the one before."""
+        """Store the oldest pending view and link its cell to the cell of the keyframe before.
+
+        A view that was recognised shares the cell that it was recognised as; any other becomes a cell of its own.
+        """
         view = self._pending.popleft()
         cell, tolerance = view.cell, self._config.sequence.length_tolerance * spacing
         if cell < 0:

@@ -22,7 +22,7 @@ from hippodrome.core.types import AttractorStates, FloatArray
 
 @dataclass(frozen=True)
 class MapperAttractorConfig:
-    """The mapper's networks, and how strongly a recognised place speaks to them."""
+    """The mapper's networks, and how strongly a recognised place corrects them."""
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 
@@ -72,7 +72,7 @@ def path_integrate(state: NeuralPose, motion: FloatArray, dt_s: float, config: M
 
 
 def inject(state: NeuralPose, pose: FloatArray, config: MapperAttractorConfig) -> NeuralPose:
-    """A recognised view cell speaks for a pose (3,): Eqs. (13)-(14), Li et al. 2025, in both networks."""
+    """Inject the pose (3,) that a recognised view cell tells into both networks, Eqs. (13)-(14), Li et al. 2025."""
     head = head_direction.inject(state.head, float(pose[2]), config.injection_share * config.head.information, config.head)
     per_length = 2.0 * np.pi / state.grid.period[0]
     strength = np.full(2, config.injection_share * config.grid.information * per_length**2)

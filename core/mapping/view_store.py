@@ -28,7 +28,7 @@ class ViewStore:
         self.bank = make_bank(config.kind, config.shape, self._templates[:0], no_mean)
 
     def append(self, descriptor: Descriptor) -> None:
-        """One more view (D,)."""
+        """Store one more view (D,) and update the bank."""
         if self._count == len(self._templates):
             self._templates = np.concatenate([self._templates, np.zeros_like(self._templates)])
         self._templates[self._count] = descriptor

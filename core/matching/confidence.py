@@ -30,10 +30,10 @@ class ConfidenceConfig:
 
 
 def distant_gap(points_m: FloatArray, alternatives: RouteAlternatives, distant_m: float) -> FloatArray:
-    """By how many nats (T,) the best complete route leads the best one that is at another place at that sample.
+    """By how many nats (T,) the best route leads the best complete route that is at another place at that sample.
 
-    The gap is between complete routes, so that evidence from before and after the sample counts. Where the search's margin holds
-    no alternative at another place, the gap is at least that margin and returned as inf.
+    The gap is between complete routes, so that evidence from before and after the sample counts. Where the search has kept no
+    alternative at another place, the gap is at least the margin of the search and returned as inf.
 
     Args:
         points_m: (T, 2) the best route.
@@ -75,16 +75,22 @@ def match_status(route: Route, config: ConfidenceConfig, closures: Edges | None 
 
 
 def _explained(route: Route, config: ConfidenceConfig) -> BoolArray:
-    """Samples (T,) on the network around which the mean score of a step is high enough."""
+    """Mask (T,) of the samples at which the route explains the drive: it is on the network, and its steps score well enough.
+
+    Scores are averaged over a window around the sample, which is shorter at the ends of the drive, so that no single corner
+    decides.
+    """
     width = min(config.window, len(route.score_nats))
     kernel = np.ones(width)
-    score = np.convolve(route.score_nats, kernel, "same") / np.convolve(np.ones(len(route.score_nats)), kernel, "same")
-    explained: BoolArray = (route.lane >= 0) & (score >= config.least_score_nats)
+    mean_score = np.convolve(route.score_nats, kernel, "same") / np.convolve(np.ones(len(route.score_nats)), kernel, "same")
+    explained: BoolArray = (route.lane >= 0) & (mean_score >= config.least_score_nats)
     return explained
 
 
 def reject_displaced(status: UInt8Array, route: Route, poses: FloatArray, config: ConfidenceConfig) -> UInt8Array:
-    """Status (S,) with the matched visits made ambiguous that the refinement moved too far: search and refinement disagree.
+    """Status (S,) of the visits, where matched visits that the refinement has moved too far are made ambiguous.
+
+    Search and refinement then disagree about the place, and neither is believed.
 
     Args:
         status: (S,) MatchStatus of each visit by the search.

@@ -27,12 +27,12 @@ _SCALE_STEP_NATS = 0.5  # cost of a change of scale by one bin: cheap, since the
 
 
 def on_parallel_lanes(line: RouteLine, network: RoadNetwork) -> BoolArray:
-    """Which samples (P,) of the line lie on a lane with an adjacent one."""
+    """Mask (P,) of the samples of the line that lie on a lane with an adjacent lane, so that either may have been driven."""
     return (line.lane >= 0) & network.has_adjacent_lane()[np.maximum(line.lane, 0)]
 
 
 def near_lane_changes(line: RouteLine, network: RoadNetwork) -> BoolArray:
-    """Which samples (P,) of the line lie within ``LANE_CHANGE_M`` of a lane change."""
+    """Mask (P,) of the samples of the line within ``LANE_CHANGE_M`` of a lane change, where the vehicle is between two lanes."""
     before, after = line.lane[:-1], line.lane[1:]
     changes_m = line.arc_m[:-1][network.are_adjacent(before, after) & (before != after)]
     if len(changes_m) == 0:
@@ -44,12 +44,12 @@ def near_lane_changes(line: RouteLine, network: RoadNetwork) -> BoolArray:
 
 
 def unknown_lane_sigma_m(line: RouteLine, arc_m: FloatArray, lane_unknown: BoolArray) -> FloatArray:
-    """Lateral sigma (S,) that the choice of the lane adds at places on the line.
+    """Lateral standard deviation (S,) in metres that not knowing the lane adds at places on the line.
 
     Args:
         line: the route's line of P samples.
         arc_m: (S,) arc lengths of the places.
-        lane_unknown: (P,) samples whose lane may be the wrong one of several.
+        lane_unknown: (P,) mask of the samples whose lane may be the wrong one of several parallel ones.
 
     Returns:
         ``UNKNOWN_LANE_SIGMA_M`` where the lane of the next sample is unknown, else 0.
@@ -60,11 +60,11 @@ def unknown_lane_sigma_m(line: RouteLine, arc_m: FloatArray, lane_unknown: BoolA
 
 
 def choose_lanes(poses: FloatArray, matched: BoolArray, network: RoadNetwork, config: RouteSearchConfig) -> Route:
-    """The route searched anew along metric poses.
+    """Search the route once more along metric poses, whose lateral positions tell parallel lanes apart.
 
     Args:
         poses: (S, 3) in the network frame; the search begins near the first.
-        matched: (S,) poses that also say where the route is.
+        matched: (S,) mask of the poses that are on the route; only these hold the new route to their places.
         network: the roads.
         config: states, bounds and costs of the search.
     """

@@ -19,7 +19,7 @@ _BACK_M = 1.5  # positions may step back by rounding; farther back on the same l
 
 
 class Leg(NamedTuple):
-    """A part of the way on one lane, or (lane -1) straight ahead off the network."""
+    """A part of the route on one lane, or (lane -1) straight ahead off the network."""
 
     lane: int
     begin_m: float  # arc length on the lane; off the network 0
@@ -33,7 +33,7 @@ class Leg(NamedTuple):
 
 
 class _Passage(NamedTuple):
-    """From one lane to the next: at its end to a successor, or anywhere to an adjacent lane."""
+    """A move from one lane to another: from its end to a successor, or by a lane change to an adjacent lane."""
 
     from_lane: int
     left_at_m: float  # arc length on the lane that is left
@@ -42,7 +42,7 @@ class _Passage(NamedTuple):
 
 
 class _OpenLane(NamedTuple):
-    """A lane to be walked in search of a place, and how it was reached."""
+    """A lane on the stack of the depth-first search of ``_passages``, and how it was reached."""
 
     lane: int
     begin_m: float  # distance from the start of the walk to the lane's beginning, negative for the first lanes
@@ -70,7 +70,7 @@ def route_line(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArra
 
 
 def _legs(route: Route, network: RoadNetwork) -> tuple[list[Leg], FloatArray]:
-    """The legs driven one after the other, and the arc length (T,) at each sample of the route."""
+    """The legs of the route in driving order, and the arc length (T,) along them at each sample of the route."""
     lengths = network.lane_lengths_m()
     legs: list[Leg] = []
     done, sample_arc = 0.0, np.zeros(len(route.lane))
@@ -102,9 +102,10 @@ def _step_legs(route: Route, network: RoadNetwork, lengths_m: FloatArray, t: int
 def _passages(
     network: RoadNetwork, lengths_m: FloatArray, start: tuple[int, float], end: tuple[int, float], driven_m: float
 ) -> list[_Passage]:
-    """The passages on the way from one (lane, arc length) to another: of all ways the one whose length is nearest to driven.
+    """The moves from lane to lane between two positions (lane, arc length), found by a depth-first search of the lanes ahead.
 
-    As in the lane graph, a lane change is possible at the beginning only. The ways are walked depth-first.
+    Several ways may lead there; the one whose length is nearest to ``driven_m`` is taken. As in the lane graph, a lane change is
+    possible at the beginning only.
     """
     open_ = _first_lanes(network, lengths_m, *start)
     best: list[_Passage] = []
@@ -123,11 +124,11 @@ def _passages(
 
 
 def _first_lanes(network: RoadNetwork, lengths_m: FloatArray, lane: int, position_m: float) -> list[_OpenLane]:
-    """The lane on which a way begins, and those that a lane change leads to at once."""
+    """The lanes on which the search of ``_passages`` begins: the given one, and those that a lane change leads to at once."""
     open_ = [_OpenLane(lane, -position_m, [])]
-    for side in network.adjacent_lanes(lane):
-        entered_at_m = entry_position_m(position_m, lengths_m[lane], lengths_m[side])
-        open_.append(_OpenLane(side, -entered_at_m, [_Passage(lane, position_m, side, entered_at_m)]))
+    for adjacent in network.adjacent_lanes(lane):
+        entered_at_m = entry_position_m(position_m, lengths_m[lane], lengths_m[adjacent])
+        open_.append(_OpenLane(adjacent, -entered_at_m, [_Passage(lane, position_m, adjacent, entered_at_m)]))
     return open_
 
 

@@ -77,7 +77,7 @@ def match(poses_m: FloatArray, geometry: RoadGeometry, config: PaperMatchConfig)
 
 
 def _transitions(poses_m: FloatArray, candidates: Projections, geometry: RoadGeometry, config: PaperMatchConfig) -> _Transitions:
-    """Measured against driving distances between all candidates of consecutive vertices."""
+    """d_t of Eq. (9) for all pairs of candidates of consecutive vertices: the measured against the driving distance."""
     measured_m = np.linalg.norm(np.diff(poses_m[:, :2], axis=0), axis=1)
     table = route_table(geometry, candidates.lane, config.route_slack_m + float(np.max(measured_m, initial=0.0)))
     first, route_m = route_distances_m(table, candidates.start, candidates.lane, candidates.position_m)
@@ -96,7 +96,7 @@ def _most_likely_path(
 def _estimated_noise(
     path: IntArray, part: IntArray, candidates: Projections, transitions: _Transitions, config: PaperMatchConfig
 ) -> tuple[float, float]:
-    """sigma_z of Eq. (8) and beta of Eq. (9) over the present match, not below their lower bounds."""
+    """sigma_z of Eq. (8) and beta of Eq. (9), in metres, estimated from the present match, not below their lower bounds."""
     matched = path >= 0
     linked = np.flatnonzero(matched[:-1] & matched[1:] & (part[:-1] == part[1:]))  # vertices with a transition to the next one
     if not len(linked):
@@ -110,7 +110,11 @@ def _estimated_noise(
 
 
 def _status(path: IntArray, part: IntArray, config: PaperMatchConfig) -> UInt8Array:
-    """MatchStatus (V,): off the network without a candidate, without a route in parts of too few vertices."""
+    """MatchStatus (V,) of the vertices.
+
+    A vertex without a candidate lane is off the network. A part of the path (see ``viterbi``) with fewer vertices than
+    ``min_part_vertices`` has no route that would confirm it, and is given up.
+    """
     status = np.where(path >= 0, MatchStatus.MATCHED, MatchStatus.OFF_NETWORK).astype(np.uint8)
     size = np.bincount(part[part >= 0], minlength=1)
     status[(part >= 0) & (size[part] < config.min_part_vertices)] = MatchStatus.NO_ROUTE
@@ -129,7 +133,10 @@ def _matched_positions(path: IntArray, status: UInt8Array, candidates: Projectio
 
 
 def _breaks(path: IntArray, part: IntArray, status: UInt8Array, config: PaperMatchConfig) -> tuple[MatchBreak, ...]:
-    """Runs of vertices without candidates, parts of too few vertices, and steps without a route, in the order of the drive."""
+    """Where and why the match is broken, in the order of the drive.
+
+    Breaks are runs of vertices without a candidate lane, parts of too few vertices, and steps that no route leads across.
+    """
     off = f"no road within {config.radius_m:g} m"
     short = f"fewer than {config.min_part_vertices} vertices between two breaks"
     found = [MatchBreak(a, b, MatchStatus.OFF_NETWORK, off) for a, b in _runs(status == MatchStatus.OFF_NETWORK)]

@@ -84,7 +84,11 @@ def _extend(trellis: _Trellis, t: int, score: FloatArray, predecessor: IntArray)
 
 @njit(cache=True)
 def _traced_back(state_start: IntArray, part: IntArray, score: FloatArray, predecessor: IntArray) -> IntArray:
-    """The state (T,) of each step on the best path of its part."""
+    """The state (T,) of each step on the most likely path, -1 for a step without states.
+
+    Where no state of the next step could be reached, a path ends and a new one begins. Each such ``part`` (T,) of the path is
+    traced back by itself, from the state with the best ``score`` at its last step.
+    """
     steps = len(part)
     path = np.full(steps, -1, dtype=np.int32)
     for t in range(steps - 1, -1, -1):

@@ -46,7 +46,7 @@ class Survivors(NamedTuple):
 
     row_start: NDArray[np.int64]  # (t + 1,)
     hypotheses: Hypotheses
-    places: Places  # of the hypotheses off the network
+    places: Places  # the places of the hypotheses off the network
 
 
 class Alternatives(NamedTuple):
@@ -58,16 +58,17 @@ class Alternatives(NamedTuple):
 
 
 class _Scratch(NamedTuple):
-    """Memory that the steps share; the two tables hold -1 everywhere between steps."""
+    """Arrays that all steps use, so that no step has to allocate them; the two tables hold -1 everywhere between steps."""
 
     row_of_state: IntArray  # (N * K,) row of the hypothesis in each state, bin by bin
-    row_of_lane: IntArray  # (L,)
+    row_of_lane: IntArray  # (L,) used by ``drive_off``
     successors: Successors  # (MOST_SUCCESSORS,)
     scale_count: int  # K
 
 
 @njit(cache=True, error_model="numpy")
 def _make_scratch(model: SearchModel) -> _Scratch:
+    """Scratch memory for the N bins, L lanes and K scales of the model."""
     scale_count = model.scales.shape[0]
     row_of_state = np.full(model.graph.lane.shape[0] * scale_count, -1, np.int32)
     row_of_lane = np.full(model.graph.lane.max() + 1, -1, np.int32)
@@ -156,7 +157,7 @@ def _merge(
 
 @njit(cache=True, error_model="numpy")
 def _forget_states(hypotheses: Hypotheses, scratch: _Scratch) -> None:
-    """Clear the table of states, which knows these hypotheses."""
+    """Set the entries of these hypotheses in the table of states back to -1, for the next step."""
     for i in range(hypotheses.shape[0]):
         if hypotheses[i].bin >= 0:
             scratch.row_of_state[hypotheses[i].bin * scratch.scale_count + hypotheses[i].scale_bin] = -1
@@ -164,7 +165,11 @@ def _forget_states(hypotheses: Hypotheses, scratch: _Scratch) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _keep_best(hypotheses: Hypotheses, least_nats: float, most: int) -> int:
-    """Move those that score at least ``least_nats``, about the ``most`` best of them, to the front; returns their number."""
+    """Prune the hypotheses of one step in place, which bounds time and memory; returns how many are left.
+
+    Hypotheses that score less than ``least_nats`` are dropped. If there are more than ``most``, all below the ``most``-th best
+    score are dropped, too; ties may leave a few more. The survivors move to the front and keep their order.
+    """
     count = hypotheses.shape[0]
     if count > most:
         scores = np.empty(count, np.float32)
@@ -189,8 +194,8 @@ def backward(
         drive: as in the forward pass.
         model: as in the forward pass.
         margin_nats: survivors farther behind get ``NOWHERE``.
-        survivors: of the forward pass.
-        onward_nats: best score on from each survivor of the last sample; 0 if the drive ends there.
+        survivors: the result of the forward pass.
+        onward_nats: best score of the drive after the last sample, from each survivor there; 0 if the drive ends there.
     """
     row_start, rows, places = survivors
     times = row_start.shape[0] - 1
@@ -223,9 +228,11 @@ def backward(
 def _prune_and_index(survivors: Survivors, through: Float32Array, t: int, least_nats: float, scratch: _Scratch) -> float:
     """Prepare the survivors of sample ``t``, whose best complete routes are known, for the step backward from them.
 
-    Survivors below ``least_nats`` become ``NOWHERE``. The table of states learns where the others on the network are; those off
-    it pass the score of their best complete route on to their parents at once. Returns the best score that any of them has still
-    to come.
+    Survivors below ``least_nats`` become ``NOWHERE``. The others on the network are entered in the table of states, in which
+    ``_pass_back`` finds them. Those off the network hand the score of their best complete route to their parents at once.
+
+    Returns:
+        The best score that any of the survivors can gain between sample ``t`` and the end.
     """
     rows, most_onward = survivors.hypotheses, NOWHERE
     for i in range(survivors.row_start[t], survivors.row_start[t + 1]):
@@ -252,10 +259,12 @@ def _pass_back(rows: Hypotheses, through: Float32Array, i: int, found: Successor
 
 @njit(cache=True, error_model="numpy")
 def alternatives(survivors: Survivors, through: Float32Array, points_m: FloatArray, cell: IntArray) -> Alternatives:
-    """The survivors that lead somewhere, thinned: at each sample the best one in each cell of the lanes, and all off the network.
+    """Where else the vehicle may have been at each sample: the places of the survivors that lie on good complete routes.
+
+    Survivors are thinned: of those in one cell of a lane the best is kept. All those off the network are kept.
 
     Args:
-        survivors: of the forward pass.
+        survivors: the result of the forward pass.
         through: (rows,) as the backward pass returns it.
         points_m: (N, 2) centre of each bin.
         cell: (N,) cell that each bin belongs to.
@@ -285,9 +294,9 @@ def alternatives(survivors: Survivors, through: Float32Array, points_m: FloatArr
 def _keep_best_of_cells(
     survivors: Survivors, through: Float32Array, t: int, cell: IntArray, kept: IntArray, size: int, place_of_cell: IntArray
 ) -> int:
-    """Append the rows of one sample that ``alternatives`` keeps to ``kept``, which holds ``size`` rows; returns its new size.
+    """Append the rows of sample ``t`` that ``alternatives`` keeps to ``kept``, which holds ``size`` rows; returns its new size.
 
-    ``place_of_cell`` is scratch memory: -1 everywhere before and after.
+    ``place_of_cell`` is scratch memory, -1 everywhere before and after: the index in ``kept`` of the best row in each cell.
     """
     rows, first = survivors.hypotheses, size
     for i in range(survivors.row_start[t], survivors.row_start[t + 1]):

@@ -19,7 +19,7 @@ from hippodrome.core.roads.lane_graph import BinGrid
 from hippodrome.core.se2 import wrap_near_zero
 from hippodrome.core.types import IntArray
 
-MOST_OFF = 192  # hypotheses off the network in one step; beyond this the worst gives way
+MOST_OFF = 192  # most hypotheses off the network in one step; a further one replaces the worst
 _SAME_PLACE_M = 4.0  # closer than this, two hypotheses off the network count as one ...
 _SAME_OFFSET_RAD = 0.3  # ... if their heading offsets are no farther apart than this
 _KNOWN_LANES = 30  # good hypotheses on more lanes than this: the route is not known, so nothing can be said to leave the network
@@ -54,7 +54,7 @@ def followed_offset(offset_rad: float, turn_rad: float, costs: StepCosts) -> flo
 
 @njit(cache=True, error_model="numpy")
 def rejoin(hypothesis: Hypothesis, place: Place, observation: StepObservation, model: SearchModel, out: Successors) -> int:
-    """Bins on which a hypothesis off the network, now at ``place``, may come back: writes them into ``out``, counted."""
+    """Write the bins on which a hypothesis off the network, now at ``place``, may come back into ``out``; return how many."""
     graph, costs, off = model.graph, model.costs, model.off_network
     spread = _PLACE_SIGMA_M + off.drift * place.driven_m
     radius = _RETURN_SIGMAS * spread
@@ -83,7 +83,7 @@ def rejoin(hypothesis: Hypothesis, place: Place, observation: StepObservation, m
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _cells_around(grid: BinGrid, x_m: float, y_m: float, radius_m: float) -> tuple[int, int, int, int]:
-    """First and last column, first and last row of the cells that a circle touches; the last is below the first if none."""
+    """First and last column, first and last row of the grid's cells that a circle may touch; last < first if there are none."""
     column_0 = max(int((x_m - radius_m - grid.origin_m[0]) / grid.cell_m), 0)
     column_1 = min(int((x_m + radius_m - grid.origin_m[0]) / grid.cell_m), grid.columns - 1)
     row_0 = max(int((y_m - radius_m - grid.origin_m[1]) / grid.cell_m), 0)
@@ -108,10 +108,10 @@ def drive_off(
     hypotheses: Hypotheses, places: Places, rows: StepRows, best: float, beam_nats: float, observation: StepObservation,
     model: SearchModel, row_of_lane: IntArray,
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Append the hypotheses that are off the network after a step: those that were before it, and those that leave now.
+    """Append the hypotheses that are off the network after a step: those that were off it before, and those that leave it now.
 
-    Both arrays have room for ``MOST_OFF`` more rows. Of hypotheses near each other the best is kept, and of too many the worst
-    gives way.
+    Both arrays have room for ``MOST_OFF`` more rows. Of hypotheses near each other only the best is kept. Once there are
+    ``MOST_OFF``, a further one replaces the worst.
 
     Returns:
         How many hypotheses and how many places there are now, and the best score of the step.
@@ -142,9 +142,10 @@ def drive_off(
 def _row_to_replace(
     hypotheses: Hypotheses, places: Places, first: int, size: int, place: Place, heading_offset_rad: float
 ) -> int:
-    """Among the hypotheses ``first:size`` off the network the last one that is about the same as the new one.
+    """Which of the hypotheses ``first:size`` off the network a new hypothesis competes with for a row; -1: it gets a new row.
 
-    If there is none, -1 as long as there are fewer than ``MOST_OFF``, else the worst one.
+    It competes with one at about the same place and with about the same heading offset, the last of these if there are several,
+    as both would go the same way. Otherwise it gets a new row, or competes with the worst one if there are ``MOST_OFF`` already.
     """
     same, worst = -1, first
     for other in range(first, size):
@@ -174,9 +175,10 @@ def _going_off(hypotheses: Hypotheses, begin: int, end: int, model: SearchModel,
 
 @njit(cache=True, error_model="numpy")
 def _leaving(hypotheses: Hypotheses, model: SearchModel, row_of_lane: IntArray) -> NDArray[np.int64]:
-    """The best hypothesis on each lane, among those close to the best of all; none if these are on too many lanes.
+    """Indices of the hypotheses that leave the network now: of those close to the best of all, the best one on each lane.
 
-    ``row_of_lane`` (L,) is scratch memory: -1 everywhere before and after.
+    If these are on more than ``_KNOWN_LANES`` lanes, the route is not known well enough, and none leaves. ``row_of_lane`` (L,) is
+    scratch memory, -1 everywhere before and after.
     """
     lane, best = model.graph.lane, NOWHERE
     for i in range(hypotheses.shape[0]):

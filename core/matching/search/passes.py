@@ -18,9 +18,9 @@ from hippodrome.core.matching.search.model import Drive, SearchModel
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, compiled_drive, compiled_model
 from hippodrome.core.types import Float32Array, FloatArray, IntArray
 
-_MAX_ROWS = 8_000_000  # hypotheses of a section: 200 MB
+_MAX_ROWS = 8_000_000  # most hypotheses that are kept of a section of the drive: 200 MB
 _EXACT_NATS = 4000.0  # scores below minus this are counted from a new zero, else single precision rounds them by 0.0005 and more
-_CELL_M = 8.0  # length of a lane's cell: alternatives in one cell are one
+_CELL_M = 8.0  # length of the cells of a lane: alternatives in one cell count as one
 
 
 class TracedRoute(NamedTuple):
@@ -28,24 +28,36 @@ class TracedRoute(NamedTuple):
 
     hypotheses: Hypotheses  # (T,)
     points_m: FloatArray  # (T, 2) centre of the bin, or the dead-reckoned place
-    score_nats: FloatArray  # (T,) log likelihood up to each sample
+    score_nats: FloatArray  # (T,) log likelihood of the route up to each sample
     alternatives: Alternatives
 
 
 class _Section(NamedTuple):
     """A part of the drive between two checkpoints; the last sample of a section is the first one of the next."""
 
-    first: int  # sample of the checkpoint that it begins with
-    last: int  # sample of the checkpoint that it ends with
+    first: int  # sample at the checkpoint with which the section begins
+    last: int  # sample at the checkpoint with which it ends
     initial: InitialHypotheses  # the survivors at the first sample
-    score_offset_nats: float  # to be added to all scores of the section
+    score_offset_nats: float  # to be added to all scores of the section, which are counted from a zero of its own
 
 
 def forward_pass(
     drive: Drive, model: SearchModel, initial: InitialHypotheses, beam_nats: float, most: int, enough: int = 0
 ) -> Survivors:
-    """One beam search, ended early once no more than ``enough`` survivors are left or there is no room for more."""
-    limits = BeamLimits(beam_nats, most, enough, max(_MAX_ROWS, 4 * len(initial.hypotheses)))
+    """Beam search over a drive, or over as much of it as fits into memory.
+
+    The search ends early once at most ``enough`` hypotheses survive a step, or once ``_MAX_ROWS`` have survived all steps.
+
+    Args:
+        drive: the drive.
+        model: lane graph, scales and costs.
+        initial: hypotheses at the first sample.
+        beam_nats: a hypothesis this far behind the best one of its step is dropped.
+        most: about how many hypotheses may survive a step.
+        enough: the search may end once no more than these survive a step; with 0 it goes on as long as any do.
+    """
+    most_rows = max(_MAX_ROWS, 4 * len(initial.hypotheses))  # room for a few steps even if there are very many at the beginning
+    limits = BeamLimits(beam_nats, most, enough, most_rows)
     survivors: Survivors = forward(drive, model, limits, *initial)
     return survivors
 
@@ -53,7 +65,11 @@ def forward_pass(
 def most_likely_route(
     problem: SearchProblem, initial: InitialHypotheses, config: RouteSearchConfig, place_prior: FloatArray | None = None
 ) -> TracedRoute | None:
-    """The most likely route from the initial hypotheses over the whole drive; None where no route is as long."""
+    """The most likely route over the whole drive from the initial hypotheses; None if no route is as long as the drive.
+
+    The drive is searched forward in sections, each as long as memory allows. The survivors at the end of one section are the
+    initial hypotheses of the next. The route is then traced backward through all sections.
+    """
     drive = compiled_drive(problem, problem.track.heading_rad, place_prior)
     model = compiled_model(problem)
     sections: list[_Section] = []
@@ -68,16 +84,19 @@ def most_likely_route(
             break
         initial = last_survivors(survivors)
         best = initial.hypotheses["score_nats"].max()
-        best = best if best < -_EXACT_NATS else np.float32(0.0)
-        initial.hypotheses["score_nats"] -= best
-        first, score_offset = last, score_offset + float(best)
+        new_zero = best if best < -_EXACT_NATS else np.float32(0.0)  # keeps scores exact in single precision
+        initial.hypotheses["score_nats"] -= new_zero
+        first, score_offset = last, score_offset + float(new_zero)
     return None
 
 
 def last_survivors(survivors: Survivors) -> InitialHypotheses:
-    """The survivors of the last step, to begin a further search with."""
+    """The survivors of the last step, as hypotheses that a further search can begin with.
+
+    Only the places that these hypotheses refer to are kept, and they are numbered anew.
+    """
     last = survivors.hypotheses[survivors.row_start[-2] : survivors.row_start[-1]].copy()
-    off = last["bin"] < 0
+    off = last["bin"] < 0  # off the network, ``bin`` is -1 minus the index of the place
     places = survivors.places[-1 - last["bin"][off]]
     last["bin"][off] = -1 - np.arange(len(places))
     return InitialHypotheses(last, places)
@@ -96,7 +115,12 @@ def _backward_pass(
     survivors: Survivors,
     config: RouteSearchConfig,
 ) -> TracedRoute:
-    """The best route and its alternatives, section by section from the last, whose survivors are given."""
+    """The best route and its alternatives, traced from the end of the drive backward through the sections.
+
+    Only the survivors of the last section are still in memory (``survivors``). For every section before it the forward pass is
+    repeated from its checkpoint. Each section hands two things back to the one before: the hypothesis at which the best route
+    enters it (``end``), and the score that each of its initial hypotheses still gains up to the end of the drive (``onward``).
+    """
     cell = _cells(problem)
     last = last_survivors(survivors).hypotheses
     end, onward = int(np.argmax(last["score_nats"])), np.zeros(len(last), np.float32)
@@ -114,13 +138,16 @@ def _backward_pass(
 
 
 def _onward_nats(through: Float32Array, initial: InitialHypotheses) -> Float32Array:
-    """What each initial hypothesis of a section still leads to: the best complete route through it, less the way to it."""
+    """The score that each initial hypothesis of a section gains up to the end of the drive, on its best route; up to a constant.
+
+    It is the score of the best complete route through the hypothesis (``through``), less that of the hypothesis itself.
+    """
     onward: Float32Array = through[: len(initial.hypotheses)] - initial.hypotheses["score_nats"]
     return onward
 
 
 def _trace_back(survivors: Survivors, end: int) -> IntArray:
-    """Rows (t,) of the route that ends in the ``end``-th survivor of the last step."""
+    """The rows (t,) in ``survivors`` of the route that ends in the ``end``-th survivor of the last of t steps."""
     row_start, parent = survivors.row_start, survivors.hypotheses["parent"]
     row = np.empty(len(row_start) - 1, np.int32)
     row[-1] = row_start[-2] + end
@@ -132,7 +159,7 @@ def _trace_back(survivors: Survivors, end: int) -> IntArray:
 def _traced(
     problem: SearchProblem, survivors: Survivors, row: IntArray, score_offset_nats: float, thinned: Alternatives
 ) -> TracedRoute:
-    """The route through the given rows (t,) of a section's survivors."""
+    """The route through the rows ``row`` (t,) of a section's survivors, with places in metres and scores of the whole drive."""
     best = survivors.hypotheses[row].copy()
     off = best["bin"] < 0
     points = problem.graph.points_m[np.maximum(best["bin"], 0)].astype(np.float64)
@@ -155,7 +182,7 @@ def _joined(parts: list[TracedRoute]) -> TracedRoute:
 
 
 def _joined_alternatives(before: Alternatives, after: Alternatives) -> Alternatives:
-    """Those of all samples but the last of ``before``, then those of ``after``."""
+    """The alternatives of two consecutive sections; their common sample has those of ``after``."""
     kept = before.row_start[-2]
     return Alternatives(
         np.concatenate([before.row_start[:-2], after.row_start + kept]),
@@ -165,7 +192,7 @@ def _joined_alternatives(before: Alternatives, after: Alternatives) -> Alternati
 
 
 def _cells(problem: SearchProblem) -> IntArray:
-    """Cell (N,) of each bin: every lane is cut into cells of about ``_CELL_M``."""
+    """Number (N,) of the cell that each bin belongs to: every lane is cut into cells of about ``_CELL_M``."""
     graph = problem.graph
     start = graph.lane_start[graph.lane]
     cells: IntArray = start + (np.arange(graph.bin_count, dtype=np.int32) - start) // max(round(_CELL_M / problem.bin_m), 1)

@@ -1,8 +1,8 @@
-"""Initial hypotheses of the route search: near a prior pose, or from nothing at all.
+"""Initial hypotheses of the route search: near a prior pose, or anywhere in the network if nothing is known.
 
-From nothing, hypotheses everywhere, in coarse bins, are searched over a short part of the drive that begins at an anchor, a
-sample that much turning follows. Those that explain it are turned into fine bins and traced backwards in time, from the anchor to
-the drive's beginning.
+If nothing is known, a coarse search begins in all bins at an *anchor*, a sample of the drive that much turning follows, as turns
+tell roads apart. It goes over a short part of the drive only. The hypotheses that explain this part are refined to fine bins and
+traced backwards in time, from the anchor to the drive's beginning.
 """
 
 from __future__ import annotations
@@ -33,9 +33,10 @@ _NO_PLACES = np.empty(0, PLACE)
 
 
 def anchor_samples(track: Track, most: int) -> list[int]:
-    """Up to ``most`` samples to begin the search at, at least a horizon apart: those that most turning follows.
+    """Up to ``most`` samples at which to begin the search for an unknown start, the best one first.
 
-    Turns soon after the sample count more than late ones.
+    The vehicle turns much after them, so that few places in the network fit. Turns count less the later they come, and not at all
+    after ``_HORIZON`` steps. Chosen samples are at least ``_HORIZON`` steps apart.
     """
     turning = np.minimum(np.abs(np.diff(track.heading_rad, append=track.heading_rad[-1])), _MOST_TURN_RAD)
     weight = 1.0 - np.arange(_HORIZON) / _HORIZON
@@ -50,7 +51,7 @@ def anchor_samples(track: Track, most: int) -> list[int]:
 
 
 def starts_without_prior(problem: SearchProblem, anchor: int, config: RouteSearchConfig) -> InitialHypotheses:
-    """Hypotheses at the drive's beginning that lead to the good ones at sample ``anchor``."""
+    """Hypotheses at the drive's beginning if its start is unknown: those from which the good hypotheses at ``anchor`` follow."""
     nats, scales = _coarse_nats(problem, anchor, config), len(problem.log_scale)
     bins = np.flatnonzero(nats.max(axis=1) > NOWHERE).astype(np.int32)
     hypotheses = _hypotheses_in(problem.graph, bins, scales, float(problem.track.heading_rad[anchor]))
@@ -78,7 +79,10 @@ def starts_near_pose(problem: SearchProblem, start: StartPose, config: RouteSear
 
 
 def _hypotheses_in(graph: LaneGraph, bins: IntArray, scales: int, heading_rad: float) -> Hypotheses:
-    """Every scale bin in each of the bins, bin by bin, headed along the lane while odometry says ``heading_rad``."""
+    """One hypothesis for each of the ``scales`` in each of the bins, bin by bin, with the vehicle heading along the lane.
+
+    ``heading_rad`` is the heading by odometry at that time.
+    """
     rows = np.zeros(len(bins) * scales, HYPOTHESIS)
     rows["bin"] = np.repeat(bins, scales)
     rows["scale_bin"] = np.tile(np.arange(scales, dtype=np.int32), len(bins))
@@ -94,12 +98,15 @@ def _prior_nats(graph: LaneGraph, start: StartPose) -> Float32Array:
 
 
 def _coarse_nats(problem: SearchProblem, anchor: int, config: RouteSearchConfig) -> Float32Array:
-    """How far the best route from each fine bin and scale bin (N, K) at the anchor falls behind the best of all.
+    """How far the best route from each bin and scale bin (N, K) at the anchor falls behind the best of all, in nats (<= 0).
 
-    It is told by a coarse search over the samples after the anchor; fine bins of one coarse bin get the same answer.
+    A search over fine bins everywhere would cost too much. The answer comes from a search in coarse bins and coarse scale bins
+    over the samples after the anchor, which ends once few hypotheses are left. Fine bins of one coarse bin get the same answer;
+    ``NOWHERE`` means that no good route begins there.
     """
     coarse = _coarse_problem(problem, config)
-    drive, model = compiled_drive(coarse, problem.track.heading_rad[anchor::2]), compiled_model(coarse)
+    every_second = problem.track.heading_rad[anchor::2]  # steps of the coarse problem are twice as long
+    drive, model = compiled_drive(coarse, every_second), compiled_model(coarse)
     bin_count, scales = coarse.graph.bin_count, len(coarse.log_scale)
     everywhere = np.arange(bin_count, dtype=np.int32)
     starts = _hypotheses_in(coarse.graph, everywhere, scales, float(problem.track.heading_rad[anchor]))
@@ -147,7 +154,10 @@ def _coarse_bin_of_lane(fine: LaneGraph, coarse: LaneGraph) -> IntArray:
 def _traced_to_beginning(
     problem: SearchProblem, anchor: int, hypotheses: Hypotheses, config: RouteSearchConfig
 ) -> InitialHypotheses:
-    """Hypotheses at the drive's beginning, from those at ``anchor``: the search run against time, on lanes driven backwards."""
+    """Hypotheses at the drive's beginning from which the given ones at ``anchor`` may have come.
+
+    The search runs backwards in time from the anchor, on a network whose lanes are driven backwards.
+    """
     network = reversed_network(problem.network)
     graph = build_lane_graph(network, problem.graph.reach_limit_m, problem.bin_m)
     backwards = replace(problem, network=network, graph=graph)
@@ -157,12 +167,12 @@ def _traced_to_beginning(
     first, places = last_survivors(survivors)
     good = first["score_nats"] >= first["score_nats"].max() - config.seed_margin_nats
     first = _time_reversed(problem.graph, first[good])
-    first["score_nats"] = 0.0  # the whole drive decides, and not this part of it
+    first["score_nats"] = 0.0  # the search over the whole drive scores this part again
     return InitialHypotheses(first, places)
 
 
 def _time_reversed(graph: LaneGraph, hypotheses: Hypotheses) -> Hypotheses:
-    """The same hypotheses with time running the other way, on the reversed network's graph."""
+    """The same hypotheses for a search that runs the other way in time, on the graph of the reversed network."""
     turned = hypotheses.copy()
     turned["bin"], turned["remainder_m"] = mirrored(graph, hypotheses["bin"]), -hypotheses["remainder_m"]
     return turned

@@ -91,9 +91,9 @@ def _normal_matrix(jacobian: csr_array, damping: float) -> csc_array:
 def _accept(
     linearise: Linearise, state: FloatArray, residual: FloatArray, jacobian: csr_array, step: FloatArray
 ) -> tuple[FloatArray, FloatArray, csr_array, float]:
-    """The state after the longest halving of ``step`` that does not raise the cost, with its residual, Jacobian and cost.
+    """Backtracking line search: the state after a step that does not raise the cost, with its residual, Jacobian and cost.
 
-    Where even the shortest raises it, everything stays as it was.
+    The step is halved until it no longer raises the cost. After ``HALVINGS`` halvings without success, the state stays as it was.
     """
     cost = _cost(residual)
     for halving in range(HALVINGS + 1):
@@ -105,5 +105,5 @@ def _accept(
 
 
 def _cost(residual: FloatArray) -> float:
-    """Half the sum of squared residuals."""
+    """Half the sum of squared residuals (m,): what Gauss-Newton minimises."""
     return 0.5 * float(residual @ residual)

@@ -66,7 +66,7 @@ class Alignment:
     """The best similarity, its cost, and the cost of the best one that differs from it."""
 
     similarity: Similarity
-    cost: float  # as of ``_costs``; 0 is perfect
+    cost: float  # cost of the similarity, as ``_costs`` defines it; 0 is perfect
     runner_up_cost: float  # cost of the best hypothesis with another scale or rotation; 1 where none is left
 
 
@@ -78,13 +78,16 @@ def apply(similarity: Similarity, poses: FloatArray) -> FloatArray:
 
 
 def align(poses: FloatArray, start: StartPose, geometry: RoadGeometry, config: AlignmentConfig) -> Alignment:
-    """The similarity that lays a map on the roads.
+    """Find the similarity that lays a map on the roads, from the start pose alone; the module describes the search.
 
     Args:
-        poses: of the map's vertices, (V, 3) in map units.
-        start: pose of the first vertex in the network's frame, about.
-        geometry: of the roads.
-        config: of the search.
+        poses: poses of the map's vertices, (V, 3) in map units.
+        start: approximate pose of the first vertex in the network's frame.
+        geometry: the roads.
+        config: limits and steps of the search.
+
+    Returns:
+        The best similarity, with its cost and the cost of the best one that differs from it.
     """
     roads = _sampled_roads(geometry, config.heading_lever_m)
     hypotheses = _scan(start, poses[0], config)
@@ -103,7 +106,10 @@ def align(poses: FloatArray, start: StartPose, geometry: RoadGeometry, config: A
 
 
 def _scan(start: StartPose, first: FloatArray, config: AlignmentConfig) -> FloatArray:
-    """The first hypotheses (H, 4): every scale with every rotation, each with the first vertex (3,) at the start pose."""
+    """The hypotheses (H, 4) that the search begins with: every scale with every rotation near the start heading.
+
+    The translation of each is such that the first vertex, at the pose ``first`` (3,) of the map, lies at the start position.
+    """
     steps = int(np.ceil(np.log(config.max_scale_m / config.min_scale_m) / np.log1p(config.scale_step)))
     scales = np.geomspace(config.min_scale_m, config.max_scale_m, steps + 1)
     turns = int(np.ceil(config.max_turn_rad / config.turn_step_rad))
@@ -114,16 +120,17 @@ def _scan(start: StartPose, first: FloatArray, config: AlignmentConfig) -> Float
 
 
 def _moved(hypotheses: FloatArray, poses: FloatArray) -> FloatArray:
-    """Poses (N, 3) of the map in the network's frame under each hypothesis, (H, N, 3)."""
+    """The poses (H, N, 3) in the network's frame at which each of H hypotheses puts the poses (N, 3) of the map."""
     a, b, tx, ty = (column[:, None] for column in hypotheses.T)
     x, y = a * poses[:, 0] - b * poses[:, 1] + tx, b * poses[:, 0] + a * poses[:, 1] + ty
     return np.stack([x, y, poses[:, 2] + np.arctan2(b, a)], axis=-1)
 
 
 def _nearest(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: AlignmentConfig) -> tuple[FloatArray, IntArray]:
-    """Distance (H, N) of each pose in position and heading to the nearest road sample, and the sample's number.
+    """Distance (H, N) in metres of each of N poses to the nearest of R road samples under each hypothesis, and its index (H, N).
 
-    Beyond the truncation the distance is infinite, and the number that of no sample.
+    The distance mixes position and heading (``_lifted``). If no sample lies within the truncation distance, the distance is
+    infinite and the index is R.
     """
     lifted = _lifted(_moved(hypotheses, poses), config.heading_lever_m)
     distance, sample = roads.tree.query(lifted, distance_upper_bound=config.truncation_m)
@@ -132,11 +139,11 @@ def _nearest(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: A
 
 
 def _costs(hypotheses: FloatArray, poses: FloatArray, roads: _Roads, config: AlignmentConfig) -> FloatArray:
-    """Cost (H,) of each hypothesis: mean truncated distance over the truncation, over the root of the scale.
+    """Cost (H,) of each hypothesis: the mean distance of the vertices from the roads, relative to ``truncation_m``.
 
-    Measured in metres of the network, a map shrunk into one junction would fit best; measured in units of the map, one blown up
-    would. Division by the root of the scale is half-way between both frames, where neither pays. Infinite for hypotheses outside
-    the limits of scale or misfit.
+    Distances are truncated, so that outliers count no more than ``truncation_m``. The mean is divided by the root of the scale:
+    in metres of the network, a map shrunk into one junction would fit best; in units of the map, one blown up would. Half-way
+    between both frames neither has an advantage. The cost is infinite outside the limits of scale or misfit.
     """
     distance, _ = _nearest(hypotheses, poses, roads, config)
     scale = np.hypot(hypotheses[:, 0], hypotheses[:, 1])
@@ -171,13 +178,20 @@ def _icp_step(
 
 
 def _rows(normal: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Derivatives (..., 4) by the hypothesis (a, b, x, y) of normal . p, p being where it puts the map's point (x, y)."""
+    """Derivatives (..., 4) of normal . p by the hypothesis (a, b, x, y), where p is the place at which it puts a map's point.
+
+    ``normal`` (..., 2) is the line's normal, ``x`` and ``y`` (...) are the point in map units.
+    """
     n_x, n_y = normal[..., 0], normal[..., 1]
     return np.stack([n_x * x + n_y * y, n_y * x - n_x * y, n_x, n_y], axis=-1)
 
 
 def _distinct(hypotheses: FloatArray, costs: FloatArray, config: AlignmentConfig) -> FloatArray:
-    """The hypotheses by rising cost, of those that ICP has brought together only the cheapest one."""
+    """The hypotheses in the order of their costs (H,), without near duplicates.
+
+    ICP brings hypotheses together. Of those in one cell of scale and rotation, half a step of the first scan wide, only the
+    cheapest is kept.
+    """
     order = np.argsort(costs, kind="stable")
     log_scale = np.log(np.hypot(hypotheses[order, 0], hypotheses[order, 1]))
     cell = np.column_stack([log_scale / config.scale_step, _rotation(hypotheses[order]) / config.turn_step_rad])
@@ -186,12 +200,15 @@ def _distinct(hypotheses: FloatArray, costs: FloatArray, config: AlignmentConfig
 
 
 def _rotation(hypotheses: FloatArray) -> FloatArray:
-    """Rotation (H,) of each hypothesis."""
+    """Rotation (H,) from map to network frame of each hypothesis (H, 4), in rad."""
     return np.arctan2(hypotheses[:, 1], hypotheses[:, 0])
 
 
 def _answer(hypotheses: FloatArray, costs: FloatArray) -> Alignment:
-    """The cheapest hypothesis as a similarity, its cost, and that of the cheapest one that counts as another."""
+    """The cheapest hypothesis as a similarity, with its cost and that of the runner-up.
+
+    The runner-up is the cheapest hypothesis that differs from the best one by more than ``_OTHER_SCALE`` or ``_OTHER_TURN_RAD``.
+    """
     order = np.argsort(costs, kind="stable")
     best, scale, rotation = order[0], np.hypot(hypotheses[:, 0], hypotheses[:, 1]), _rotation(hypotheses)
     turn = np.abs(se2.wrap(rotation - rotation[best]))
@@ -210,7 +227,7 @@ class _Roads:
 
 
 def _sampled_roads(geometry: RoadGeometry, lever_m: float) -> _Roads:
-    """A sample in the middle of every piece of lane of about ``_ROAD_SPACING_M``."""
+    """Samples of all lanes, at most ``_ROAD_SPACING_M`` apart; each is the middle of an equal piece of its lane."""
     pieces = np.maximum(1, np.ceil(geometry.lane_length_m / _ROAD_SPACING_M).astype(np.int32))
     lane = np.repeat(np.arange(len(pieces), dtype=np.int32), pieces)
     piece = np.arange(len(lane)) - np.repeat(np.cumsum(pieces) - pieces, pieces)

@@ -38,7 +38,10 @@ class Noise:
     road_inverse_freedom: float = 1.0  # the same of the road's residuals: 1 is Cauchy, as turns are drawn otherwise than driven
 
     def step_sigmas(self, length_m: FloatArray) -> FloatArray:
-        """Sigmas (N, 4) of along, across, heading and log scale over steps of the given lengths (N,)."""
+        """Standard deviations (N, 4) of odometry over steps of the given lengths (N,): along, across, heading, log scale.
+
+        They grow with the root of the length, as those of a random walk do.
+        """
         root = np.sqrt(np.maximum(length_m, STANDSTILL_M))[:, None]
         sigmas: FloatArray = root * np.array([self.along, self.across, self.heading, self.log_scale])
         return sigmas
@@ -54,16 +57,16 @@ class Noise:
 
 
 def variance_factors(residual: FloatArray, count: float, freedom_used: FloatArray) -> FloatArray:
-    """Factors (M,) by which the variances behind whitened residuals should change: sum r^2 / (count - freedom used).
+    """Factors (M,) by which the variances assumed for M kinds of residuals should change: sum r^2 / (count - freedom used).
 
-    Helmert's variance component estimation: a solution uses up tr(J Sigma J^T) of the ``count`` degrees of freedom. Its fixed
-    point is that of expectation maximisation (for Student-t: Lange, Little, Taylor 1989), but it gets there in a few rounds. The
-    number of residuals counts, not the sum of their weights: a weight above 1 adds no freedom.
+    This is Helmert's variance component estimation: a solution uses up tr(J Sigma J^T) of the ``count`` degrees of freedom. It
+    has the fixed point of expectation maximisation (for Student-t: Lange, Little, Taylor 1989), but reaches it in a few rounds.
+    The number of residuals counts, not the sum of their weights: a weight above 1 adds no freedom.
 
     Args:
-        residual: whitened and robustly weighted, (N, M).
-        count: number of residuals that say something.
-        freedom_used: tr(J Sigma J^T) per component, (M,).
+        residual: whitened and robustly weighted residuals, (N, M).
+        count: number of residuals of each kind that carry information.
+        freedom_used: tr(J Sigma J^T) of each kind, (M,).
 
     Returns:
         The factors, within ``LARGEST_CHANGE`` squared either way.
@@ -77,9 +80,9 @@ def rescaled(noise: Noise, odometry: FloatArray, road: FloatArray, closure_media
     """The noise with its sigmas times the roots of variance factors, kept above ``FLOORS``.
 
     Args:
-        noise: so far.
-        odometry: variance factors of along, across, heading, log scale, (4,).
-        road: variance factors of across the lane and heading, (2,) or more; the rest is ignored.
+        noise: the noise so far.
+        odometry: variance factors of odometry: along, across, heading, log scale, (4,).
+        road: variance factors of the road: across the lane and heading, (2,) or more; the rest is ignored.
         closure_median_sq: median over the closures of their squared whitened residual of three components, without robust weight;
             None without closures. A median, as closures may be false.
     """

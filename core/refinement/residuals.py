@@ -39,10 +39,10 @@ class RoadTargets:
     """The point of its road that each keyframe is drawn to, and how strongly."""
 
     points_m: FloatArray  # (S, 2)
-    heading_rad: FloatArray  # (S,) of the lane
-    curvature_1pm: FloatArray  # (S,) of the lane, without sign
+    heading_rad: FloatArray  # (S,) driving direction of the lane
+    curvature_1pm: FloatArray  # (S,) absolute curvature of the lane
     added_lateral_m: FloatArray  # (S,) lateral sigma beyond the driver's: which of several parallel lanes, the survey's error
-    weight: FloatArray  # (S,) 1, or next to 0 where nothing vouches for the road
+    weight: FloatArray  # (S,) 1, or nearly 0 where the keyframe may be on no road of the network
     along_sigma_m: float  # sigma along the lane; infinite: the keyframe is drawn to the line, not to a point of it
 
 
@@ -86,21 +86,22 @@ def all_factors(
 
 
 def odometry_factors(state: State, visits: Visits, noise: Noise, scale_step_variance: FloatArray) -> BinaryFactors:
-    """Odometry from each keyframe i to the next (N = S - 1): along, across, heading, log scale.
+    """Factors of odometry from each keyframe i to the next (N = S - 1): along, across, heading, log scale.
 
-        r_i = Sigma_i^(-1/2) (R_i^T (p_{i+1} - p_i) - e^{s_i} m_i,  warp(psi_{i+1} - psi_i - (1 + g) w_i - b dt_i),  s_{i+1} -
-        s_i)
+        r_i = Sigma_i^(-1/2) (R_i^T (p_{i+1} - p_i) - e^{s_i} m_i,
+                              warp(psi_{i+1} - psi_i - (1 + g) w_i - b dt_i),
+                              s_{i+1} - s_i)
 
-    m_i (map units) and w_i (rad) are the raw motion. Only the steps of the scale are Student-t, as the scale may jump. Gyros and
-    wheels have no outliers: where a turn is drawn otherwise than driven, it is the road that is wrong.
+    m_i (map units) and w_i (rad) are the raw motion. Only the steps of the scale have a robust weight (Student-t), as the scale
+    may jump. Gyros and wheels have no outliers: where a turn is drawn otherwise than it was driven, the road is wrong.
 
     Args:
-        state: where the factors are linearised.
+        state: the state at which the factors are linearised.
         visits: raw motions of the S keyframes.
-        noise: standard deviations.
-        scale_step_variance: what the data leave open about each step of the log scale, as a variance (N,). The robust weight
-            takes the *expected* squared step, to which this is added: a step that nothing tells about looks small without being
-            so.
+        noise: standard deviations of odometry.
+        scale_step_variance: posterior variance of each step of the log scale, (N,). It is added to the squared step before the
+            robust weight is taken, which so depends on the *expected* squared step: a step of which the data tell nothing is
+            estimated as small, but need not be small.
     """
     a, b = state.poses[:-1], state.poses[1:]
     motion, dt = visits.motion[1:], np.diff(visits.t_s)

@@ -82,7 +82,7 @@ def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 
 
 
 def reversed_network(network: RoadNetwork) -> RoadNetwork:
-    """The same lanes under the same indices, driven backwards: for a search that runs back in time."""
+    """The same lanes under the same indices, driven backwards, for a route search that runs back in time."""
     predecessor = np.repeat(np.arange(network.lane_count, dtype=np.int32), np.diff(network.successor_start))
     order = np.lexsort((predecessor, network.successor))
     starts, ends = network.point_start[:-1], network.point_start[1:]
@@ -97,7 +97,11 @@ def reversed_network(network: RoadNetwork) -> RoadNetwork:
 
 
 def mirrored(graph: LaneGraph, bins: IntArray) -> IntArray:
-    """The bins (K,) of the reversed network's graph that cover the same places; negative ones (off the network) stay."""
+    """Numbers (K,) of the bins of the reversed network's graph that cover the same places as ``bins`` (K,) of this ``graph``.
+
+    A search that runs back in time uses that graph. It has the bins of each lane in reverse order. Negative numbers, which mean
+    places off the network, stay as they are.
+    """
     lane = graph.lane[np.maximum(bins, 0)]
     return np.where(bins >= 0, graph.lane_start[lane] + graph.lane_start[lane + 1] - 1 - bins, bins).astype(np.int32)
 
@@ -146,7 +150,7 @@ class _Lanes(NamedTuple):
 
 
 class _Ahead(NamedTuple):
-    """Bins that lie ahead, row by row."""
+    """Bins that lie ahead of a bin, with their distances and the lane changes on the way, one row each."""
 
     bin: IntArray
     distance_m: Float32Array
@@ -232,4 +236,5 @@ def _reach_table(bins: _Bins, lanes: _Lanes, limit_m: float) -> _ReachTable:
 
 @njit(cache=True)
 def _room_for(rows: int) -> _Ahead:
+    """Arrays with room for so many bins ahead."""
     return _Ahead(np.empty(rows, np.int32), np.empty(rows, np.float32), np.empty(rows, np.uint8))

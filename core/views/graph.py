@@ -56,7 +56,7 @@ class CellGraph:
 
     @property
     def links(self) -> Links:
-        """All links so far; the arrays are views of the graph's own and must not be written to."""
+        """All links so far. The arrays share memory with the graph and must not be written to."""
         return _first_of(self._links, self.cell_count, self._link_count)
 
     def add_cell(self) -> int:
@@ -102,18 +102,26 @@ def graph_of(cells: IntArray, lengths: FloatArray, turns_rad: FloatArray, tolera
 
 
 def _empty_links(cells: int, links: int) -> Links:
-    """Arrays with room for so many cells and links, none of them there yet."""
+    """Arrays with room for so many cells and links, none of which exist yet."""
 
-    def none(size: int) -> IntArray:
+    def unset(size: int) -> IntArray:
+        """Indices (size,) of -1, which means that there is no such cell or link."""
         return np.full(size, -1, dtype=np.int32)
 
     return Links(
-        none(cells), none(cells), none(links), none(links), none(links), none(links), np.zeros(links), np.zeros(links)
-    )  # fmt: skip
+        last_in=unset(cells),
+        last_out=unset(cells),
+        source=unset(links),
+        target=unset(links),
+        next_in=unset(links),
+        next_out=unset(links),
+        length=np.zeros(links),
+        turn_rad=np.zeros(links),
+    )
 
 
 def _first_of(links: Links, cells: int, count: int) -> Links:
-    """Views of the first ``cells`` cells and the first ``count`` links."""
+    """The first ``cells`` cells and the first ``count`` links, as slices that share memory with ``links``."""
     return Links(
         last_in=links.last_in[:cells],
         last_out=links.last_out[:cells],
@@ -127,7 +135,7 @@ def _first_of(links: Links, cells: int, count: int) -> Links:
 
 
 def _copied_into(larger: Links, links: Links) -> Links:
-    """``larger`` with the cells and links of ``links`` in its first places."""
+    """Copy the cells and links of ``links`` into the first places of ``larger``, in place; returns ``larger``."""
     first = _first_of(larger, len(links.last_in), len(links.source))
     for name in Links._fields:
         getattr(first, name)[:] = getattr(links, name)
@@ -136,7 +144,10 @@ def _copied_into(larger: Links, links: Links) -> Links:
 
 @njit(cache=True)
 def walk_back(links: Links, start: int, reach: float) -> Paths:
-    """The paths no longer than ``reach`` that lead to ``start``, at most WALK_LIMIT; first that of no length from itself."""
+    """The paths no longer than ``reach`` that lead to ``start``, at most WALK_LIMIT of them.
+
+    The first one is the path of length 0 from ``start`` itself.
+    """
     walk = empty_walk()
     count = walk_back_into(walk, links, start, reach)
     return Paths(walk.source[:count], walk.length[:count], walk.turn_rad[:count])

@@ -47,11 +47,11 @@ class SequenceConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """Filtered evidence for each cell after one view."""
+    """Filtered evidence for each cell after view t."""
 
-    filtered: Float32Array  # (C,) F_t
-    z_score: Float32Array  # (C,) z_t
-    predecessor: IntArray  # (C,) cell of the view before, on the best path to this cell; -1: none
+    filtered: Float32Array  # (C,) F_t, the evidence of this view and of those before it along a path
+    z_score: Float32Array  # (C,) z_t, the z-score of this view alone
+    predecessor: IntArray  # (C,) cell of view t - 1 from which the best path leads to this cell; -1: none
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,10 @@ NO_EVIDENCE = Evidence(np.zeros(0, dtype=np.float32), np.zeros(0, dtype=np.float
 
 
 def standardise(similarity: Float32Array, min_cells: int, sigma_floor: float) -> Float32Array:
-    """z-scores (C,) of the similarities; zeros while there are too few for statistics."""
+    """z-scores (C,) of similarities (C,): how many standard deviations each lies above their mean.
+
+    They are zero while there are fewer than ``min_cells`` of them, too few for a standard deviation.
+    """
     if len(similarity) < min_cells:
         return np.zeros(len(similarity), dtype=np.float32)
     z: Float32Array = (similarity - similarity.mean()) / np.float32(max(float(similarity.std()), sigma_floor))
@@ -83,11 +86,13 @@ def standardise(similarity: Float32Array, min_cells: int, sigma_floor: float) ->
 def filter_step(
     before: Evidence, z: Float32Array, links: Links, travelled: float, turned_rad: float, spacing: float, config: SequenceConfig
 ) -> Evidence:
-    """Evidence for all C cells of a growing graph, after one view more. See ``_evidence_at`` for the formula.
+    """Evidence for all C cells of a growing graph after one more view: how well this view and those before it fit each cell.
+
+    ``_evidence_at`` has the formula.
 
     Args:
-        before: evidence after the view before; cells that were added since had none.
-        z: z-scores (C,) of this view.
+        before: evidence after the view before; cells that were added since have none.
+        z: z-scores (C,) of the similarity of this view to each cell.
         links: the graph of the C cells.
         travelled: path length since the view before, in the unit of the links.
         turned_rad: turn since the view before.
@@ -105,7 +110,10 @@ def filter_step(
 def _propagate_along(
     links: Links, before: Float32Array, z: Float32Array, driven: Step, tolerance: Step, memory: np.float32
 ) -> tuple[Float32Array, IntArray]:
-    """F_t (C,) of all cells of a graph, and the predecessor (C,) that each took its evidence from, -1 where there was none."""
+    """The compiled part of ``filter_step``: the evidence F_t (C,) of all cells, and their predecessors (C,), -1: none.
+
+    For each cell the paths that lead to it are looked for in the graph, as the graph grows with every view.
+    """
     filtered, predecessor = np.empty(len(z), dtype=np.float32), np.full(len(z), -1, dtype=np.int32)
     walk = empty_walk()
     for j in range(len(z)):
@@ -124,10 +132,10 @@ def propagate(
     tolerance: Step,
     memory: np.float32,
 ) -> Float32Array:
-    """F_t (C,) on a map whose paths were laid out beforehand.
+    """Evidence F_t (C,) on a finished map, whose paths are known beforehand; ``_evidence_at`` has the formula.
 
     Args:
-        before: F_{t-1} (C,).
+        before: evidence F_{t-1} (C,) after the view before.
         cells: cells (K,) that this view was scored against; the other cells are left without evidence.
         z: z-scores (K,) of these cells.
         predecessors: the paths that lead to each of the C cells.
@@ -146,10 +154,13 @@ def propagate(
 def _evidence_at(
     before: Float32Array, z: np.float32, paths: Paths, first: int, last: int, driven: Step, tolerance: Step, memory: np.float32
 ) -> tuple[np.float32, int]:
-    """F_t(j) = (1 - memory) z_t(j) + memory max(0, max over predecessors i of j of F_{t-1}(i)), and that predecessor or -1.
+    """Evidence of a cell j after view t, and the predecessor that it took evidence from, or -1.
 
-    The predecessors are the sources of ``paths[first:last]`` that are as long as the distance driven and turn as the vehicle
-    did. Cells beyond the end of ``before`` were added since and had no evidence. Of equal predecessors the first is taken.
+        F_t(j) = (1 - memory) z_t(j) + memory max(0, max over predecessors i of j of F_{t-1}(i))
+
+    The predecessors are the cells at which those of ``paths[first:last]`` begin that are as long as the distance driven and turn
+    as the vehicle did. Cells beyond the end of ``before`` were added since and have no evidence. Of equal predecessors the first
+    is taken.
     """
     best, predecessor = np.float32(0.0), -1
     for k in range(first, last):
@@ -162,7 +173,10 @@ def _evidence_at(
 
 
 def peak(evidence: Evidence, links: Links, reach: float) -> Peak:
-    """The best cell, and its margin over the best one farther than ``reach`` along the graph (0 when there is none)."""
+    """The cell with the most evidence, and its margin over the best cell farther than ``reach`` along the graph (0: none).
+
+    Cells nearer than that show the same place and are no rivals.
+    """
     if len(evidence.filtered) == 0:
         return Peak(-1, 0.0)
     best = int(np.argmax(evidence.filtered))
@@ -170,7 +184,7 @@ def peak(evidence: Evidence, links: Links, reach: float) -> Peak:
 
 
 def margin_over(filtered: Float32Array, best: int, rivals: NDArray[np.bool_]) -> float:
-    """Evidence of the cell ``best`` minus that of the best of the rivals (mask (C,)); 0 without rivals."""
+    """How far the best cell stands out: its evidence minus that of the best of the ``rivals`` (mask (C,)); 0 without rivals."""
     if not rivals.any():
         return 0.0
     return float(filtered[best] - filtered[rivals].max())

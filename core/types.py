@@ -47,6 +47,7 @@ class ShortRepr:
 
 
 def _short(value: Any) -> str:
+    """A value of a field in short: an array as its type and shape, a long tuple as its length, anything else as its ``repr``."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{list(value.shape)}"
     if isinstance(value, tuple) and len(value) > 4:
@@ -144,12 +145,12 @@ class MatchStatus(IntEnum):
 
 
 class LocalizationStatus(IntEnum):
-    """How the localizer stands to its own answer."""
+    """How far the localizer trusts its own estimate."""
 
     UNKNOWN = 0  # no fix yet
     LOCALIZED = 1
     OFF_MAP = 2  # dead reckoning from the last fix has left every mapped road
-    DOUBTED = 3  # views vouch for another place more than for this one
+    DOUBTED = 3  # views show another place rather than the believed one
     LOST = 4  # the fix is too old to say where
 
 
@@ -259,7 +260,7 @@ class LocalizationEstimate(ShortRepr):
 
 @dataclass(frozen=True, slots=True)
 class MatchBreak:
-    """A stretch of vertices that the road match could not vouch for, and why. Never silent, never guessed."""
+    """A stretch of vertices whose place on the roads is uncertain, and why. It is reported, and no place is guessed."""
 
     first_vertex: int
     last_vertex: int  # inclusive

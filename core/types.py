@@ -145,7 +145,7 @@ class MatchStatus(IntEnum):
 
 
 class LocalizationStatus(IntEnum):
-    """How the localizer stands to its own answer."""
+    """How far the localizer trusts its own estimate."""
 
     UNKNOWN = 0  # no fix yet
     LOCALIZED = 1
@@ -260,7 +260,7 @@ class LocalizationEstimate(ShortRepr):
 
 @dataclass(frozen=True, slots=True)
 class MatchBreak:
-    """A stretch of vertices that the road match could not vouch for, and why. Never silent, never guessed."""
+    """A stretch of vertices whose place on the roads is uncertain, and why. It is reported, and no place is guessed."""
 
     first_vertex: int
     last_vertex: int  # inclusive

@@ -186,7 +186,7 @@ def inhibit(
         mean_rad: (M modules, 2 populations, A axes).
         reliability: the same shape, 1/rad^2.
         dt_s: time since the last update.
-        config: of the network.
+        config: strengths of the inhibition, and the mode.
         information: E of each module, (M,).
     """
     scale = 1.0 if config.mode == "paper" else dt_s

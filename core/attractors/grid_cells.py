@@ -1,8 +1,8 @@
 """Grid cells: attractor networks on several tori (modules) of different periods, for the position.
 
-A torus knows a position only up to whole periods. "Sheet" is what we call each of the copies of the plane that it cannot tell
-apart: with one torus, the read-out locks to a wrong sheet once drift exceeds half a period. Modules of unequal periods together
-tell the sheets apart over kilometres (a departure: the paper has a single torus).
+The phases on a torus tell a position only up to whole periods. With a single torus, the read-out is wrong by a period once the
+drift exceeds half a period. Modules of unequal periods together tell the position over kilometres (a departure: the paper has a
+single torus).
 
 Lengths are in the caller's unit: map units while mapping, metres while localizing. An immutable state, and pure functions on it,
 as in ``head_direction``.
@@ -36,7 +36,7 @@ class GridState:
 
 
 def module_periods(smallest: float) -> FloatArray:
-    """Periods (M,) in the ratios ``PERIOD_RATIOS``, in the unit of length of the ``smallest``."""
+    """Periods (M,) of the modules in the ratios ``PERIOD_RATIOS``; ``smallest`` is the first of them, in any unit of length."""
     return smallest * np.array(PERIOD_RATIOS) / PERIOD_RATIOS[0]
 
 
@@ -56,7 +56,7 @@ def uniform(period: FloatArray, config: AttractorConfig) -> GridState:
 
 
 def known(position: FloatArray, period: FloatArray, config: AttractorConfig) -> GridState:
-    """A known position (2,): the integrators hold the information E, the calibration cells their share of it."""
+    """The state of networks that know their position (2,): the integrators hold E, the calibration cells a share of it."""
     mean = np.repeat(phase(position, period)[:, None, :], 2, axis=1)
     shares = np.array([1.0, config.calibration_share])
     total = information(period, config)[:, None, None] * shares[None, :, None] * np.ones(2)
@@ -79,7 +79,11 @@ def phase_reliability(reliability: FloatArray, period: FloatArray) -> FloatArray
 def _integrate(
     old_mean: FloatArray, old_reliability: FloatArray, period: FloatArray, step: FloatArray, sq_sigma: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """``integrate`` on arrays: new means and reliabilities (M, 2, 2)."""
+    """The compiled part of ``integrate``: returns the new means and reliabilities, each (M modules, 2 populations, 2 axes).
+
+    A displacement becomes a change of phase by the factor 2 pi / period, and a variance by the square of this factor. On an axis
+    to which the motion adds no variance, as in the paper, the reliabilities stay as they are.
+    """
     mean, reliability = np.empty_like(old_mean), old_reliability.copy()
     for m in range(mean.shape[0]):
         per_length = 2.0 * math.pi / period[m]
@@ -104,9 +108,9 @@ def integrate(state: GridState, step: FloatArray, sq_sigma: FloatArray) -> GridS
     Each population moves along its own head direction, so that two beliefs in conflict carry a heading each.
 
     Args:
-        state: before the motion.
-        step: displacements (2 populations, 2 axes).
-        sq_sigma: variances that the motion adds, the same shape; the paper adds none, so that zeros are as printed.
+        state: the networks before the motion.
+        step: the displacement of each population on each axis, (2 populations, 2 axes).
+        sq_sigma: the variance that the motion adds to each of these, in length^2, the same shape. The paper adds none: zeros.
     """
     mean, reliability = _integrate(state.mean_rad, state.reliability, state.period, step, sq_sigma)
     return GridState(state.period, mean, reliability)
@@ -137,7 +141,11 @@ def stimulate(state: GridState, position: FloatArray, reliability: FloatArray) -
 
 
 def inject(state: GridState, position: FloatArray, reliability: FloatArray, config: AttractorConfig) -> GridState:
-    """``stimulate``, Eqs. (13)-(14), Li et al. 2025; in mode "bounded" then ``hand_back``."""
+    """Inject the position (2,) that a recognised view measures, with its reliability (2,) in 1/length^2.
+
+    As printed, Eqs. (13)-(14), Li et al. 2025, change the calibration cells only (``stimulate``). In mode "bounded" the fused
+    belief then goes to both populations (``hand_back``).
+    """
     stimulated = stimulate(state, position, reliability)
     return stimulated if config.mode == "paper" else hand_back(stimulated, config)
 
@@ -214,10 +222,18 @@ def population_belief(state: GridState, population: int, near: FloatArray, reach
 
 
 def decode(mean_rad: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float) -> FloatArray:
-    """Position (2,) whose phases fit those of the modules best, among the sheets within ``reach`` of ``near`` (2,).
+    """The position (2,) that the phases of all modules encode.
 
-    ``mean_rad`` and ``reliability`` (M, 2) are one belief per module. A ``reach`` of 0 takes the sheet nearest to ``near``, as
-    path integration does at every step.
+    Each phase tells the position only up to whole periods. Of the positions that are possible within about ``reach`` of ``near``
+    (2,), the one whose phases fit those of the modules best is returned. A ``reach`` of 0 takes the possible position nearest to
+    ``near``, as after each step of path integration.
+
+    Args:
+        mean_rad: phases (M modules, 2 axes).
+        reliability: reliabilities of the phases, the same shape, 1/rad^2.
+        period: periods of the modules, (M,).
+        near: a prior position, (2,).
+        reach: how far from ``near`` to search, in the unit of the periods.
     """
     position: FloatArray = _decode(mean_rad, reliability, period, near, reach)
     return position
@@ -225,7 +241,7 @@ def decode(mean_rad: FloatArray, reliability: FloatArray, period: FloatArray, ne
 
 @njit(cache=True)
 def _decode(mean: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float) -> FloatArray:
-    """``decode``, axis by axis."""
+    """The compiled part of ``decode``: the two axes are independent of each other, and each is decoded by itself."""
     position = np.empty(2)
     for a in range(2):
         position[a] = _decode_axis(mean, reliability, period, a, near[a], reach)
@@ -267,7 +283,7 @@ def _weighted_mean(mean: FloatArray, reliability: FloatArray, period: FloatArray
 
 @njit(cache=True)
 def _misfit(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: int, coordinate: float) -> float:
-    """Sum over the modules of the squared phase error on axis ``a``, in units of its variance."""
+    """How badly a coordinate on axis ``a`` fits the phases (M, 2): the sum of their squared errors over their variances."""
     total = 0.0
     for m in range(mean.shape[0]):
         total += reliability[m, a] * wrap_compiled(mean[m, a] - 2.0 * math.pi * coordinate / period[m]) ** 2
@@ -278,7 +294,11 @@ def _misfit(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: in
 def _read_out(
     mean_rad: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float
 ) -> tuple[FloatArray, FloatArray]:
-    """``read_out`` on arrays: the fused phases of each module decoded, their reliabilities averaged in 1/length^2."""
+    """The compiled part of ``read_out``: position (2,) and reliability (2,) in 1/length^2.
+
+    In each module the two populations are fused. The position is decoded from the fused phases of all modules, and its
+    reliability is the mean of theirs.
+    """
     modules = len(period)
     mean_f, total, per_axis = np.empty((modules, 2)), np.empty((modules, 2)), np.zeros(2)
     for m in range(modules):

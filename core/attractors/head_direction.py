@@ -30,7 +30,7 @@ def uniform(config: AttractorConfig) -> HeadDirectionState:
 
 
 def known(heading_rad: float, config: AttractorConfig) -> HeadDirectionState:
-    """A known heading: the integrator holds the information E, the calibration cells their share of it."""
+    """The state of a network that knows its heading: the integrator holds E, the calibration cells a share of it."""
     reliability = config.information * np.array([1.0, config.calibration_share])
     return HeadDirectionState(np.full(2, wrap_compiled(heading_rad)), reliability)
 
@@ -64,7 +64,11 @@ def stimulate(state: HeadDirectionState, heading_rad: float, reliability: float)
 
 
 def inject(state: HeadDirectionState, heading_rad: float, reliability: float, config: AttractorConfig) -> HeadDirectionState:
-    """``stimulate``, Eqs. (13)-(14), Li et al. 2025; in mode "bounded" then ``hand_back``."""
+    """Inject the heading that a recognised view measures, with its reliability in 1/rad^2.
+
+    As printed, Eqs. (13)-(14), Li et al. 2025, change the calibration cells only (``stimulate``). In mode "bounded" the fused
+    belief then goes to both populations (``hand_back``).
+    """
     stimulated = stimulate(state, heading_rad, reliability)
     return stimulated if config.mode == "paper" else hand_back(stimulated, config)
 

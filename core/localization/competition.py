@@ -14,14 +14,16 @@ from hippodrome.core.types import FloatArray
 
 
 def relation_of(measurement: PoseMeasurement, belief: PoseBelief, adopted: bool, gate: float) -> Relation:
-    """What a measured pose agrees with.
+    """Which hypothesis of the belief a measured pose agrees with.
+
+    A measurement in the same place as the incumbent agrees with it at any Mahalanobis distance: the difference is then noise,
+    and no sign of another hypothesis.
 
     Args:
         measurement: the measured pose.
-        belief: the belief before it.
+        belief: the belief before the measurement.
         adopted: whether the belief has an incumbent yet.
-        gate: squared Mahalanobis distance up to which a measurement agrees with a hypothesis. With the incumbent it agrees also
-            if it lies in the same place: then noise divides them, not another hypothesis.
+        gate: squared Mahalanobis distance up to which a measurement agrees with a hypothesis.
     """
     if not competes(belief):
         return Relation.ALL_HYPOTHESES

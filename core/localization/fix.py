@@ -103,7 +103,10 @@ def faded(fix: Fix, config: LocalizerConfig) -> Fix:
 
 
 def recognised(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
-    """A recognised view counts for the hypothesis that it agrees with; if there is none, it begins a new challenge."""
+    """The fix after a recognised view: its evidence counts for the hypothesis that it agrees with.
+
+    A view that agrees with no hypothesis begins a new challenge.
+    """
     if view.relation is Relation.ALL_HYPOTHESES:
         total = fix.total + view.margin
         return replace(fix, adopted=total >= config.fix_evidence, total=total, map_covariance=view.map_covariance)
@@ -122,7 +125,11 @@ def challenger_wins(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> 
 
 
 def _supported(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
-    """A view that agrees with the incumbent ends any challenge. Support is bounded, so that a challenger can win at all."""
+    """The fix after a view that agrees with the incumbent: the incumbent gains evidence, and any challenge is over.
+
+    The incumbent's evidence is bounded by ``fix_evidence``, as otherwise no challenger could ever gather more. The squared
+    lateral disagreement of the view goes into a running mean, which later becomes part of the reported covariance.
+    """
     return replace(
         fix,
         support=min(fix.support + view.evidence, config.fix_evidence),
@@ -134,7 +141,10 @@ def _supported(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
 
 
 def _adopted(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
-    """The challenger becomes the incumbent with the evidence that it has; the new place was not held against a frame yet."""
+    """The fix after the challenger was adopted: it becomes the incumbent and keeps the evidence that it has gathered.
+
+    The z-score of the believed place is forgotten, as no frame has been compared with the new place yet.
+    """
     return replace(
         fix,
         adopted=True,

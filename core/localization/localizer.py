@@ -93,7 +93,10 @@ class Localizer:
         self._fix = Fix()
 
     def step(self, observation: Observation) -> LocalizationEstimate:
-        """Take one observation in; returns the estimate at its time."""
+        """Take one observation in and return the estimate at its time.
+
+        The first frame, and every later frame for which the view has changed enough, is searched for in the map.
+        """
         observation = observation if self._odometry is None else self._odometry.step(observation)
         self._predict(observation)
         if observation.frame is not None and (self._match is None or keyframes.is_due(self._view_change, self._config.steps)):

@@ -1,4 +1,4 @@
-"""The place map: a topometric map laid out for recognition. Where each view cell was seen, and which cells lead to which.
+"""The place map: a topometric map in the form for place recognition. It tells where each view cell was seen and which follow it.
 
 Cells are linked by geometry, not by the order of the mapping drive: a turn that the mapping drive never took, from one mapped
 street into another, is a path all the same.
@@ -89,9 +89,9 @@ def make_place_map(cognitive_map: CognitiveMap, network: RoadNetwork | None, lan
 
 
 def _map_covariance(cognitive_map: CognitiveMap, vertex: IntArray, sigma_m: float) -> FloatArray:
-    """(C, 3, 3) covariance that the refinement states for each cell's vertex, and ``sigma_m`` along the road on top.
+    """Covariance (C, 3, 3) of the map's error at each cell: that of the cell's vertex, plus ``sigma_m`` along the road.
 
-    A map without covariances gets ``sigma_m`` in both directions.
+    In a map without covariances the error is ``sigma_m`` both along and across the road.
     """
     if cognitive_map.covariance is None:
         return np.tile(np.diag([sigma_m**2, sigma_m**2, 0.0]), (len(vertex), 1, 1))
@@ -109,7 +109,7 @@ def lateral_variance(covariance: FloatArray, heading_rad: FloatArray) -> FloatAr
 
 
 def is_same_place(pose_m: FloatArray, other_m: FloatArray) -> bool:
-    """Whether two poses (3,) lie in the same street on the same side, so that noise may be all that divides them."""
+    """Whether two poses (3,) are near each other and face the same way, so that noise alone may explain their difference."""
     turn_rad = abs(float(se2.wrap(other_m[2] - pose_m[2])))
     return math.dist(pose_m[:2], other_m[:2]) < SAME_PLACE_M and turn_rad < LINK_TURN_RAD
 
@@ -137,14 +137,20 @@ def may_be_on_road(places: PlaceMap, pose_m: FloatArray, sigma_m: float) -> bool
 
 
 def first_vertex(view_cell: IntArray, cells: int) -> IntArray:
-    """Vertex (C,) at which each cell's template was taken: the first one that has the cell."""
+    """Vertex (C,) at which each view cell was stored: the first of the vertices that share the cell.
+
+    ``view_cell`` (V,) has the cell of each vertex, ``cells`` is their number C.
+    """
     vertex = np.zeros(cells, dtype=np.int32)
     vertex[view_cell[::-1]] = np.arange(len(view_cell) - 1, -1, -1)
     return vertex
 
 
 def _neighbours(vertex: IntArray, cognitive_map: CognitiveMap, poses_m: FloatArray) -> tuple[IntArray, IntArray]:
-    """Cells of the vertices before and after each cell's own, where they lie near, in order and face the same way; else -1."""
+    """Cells of the vertices before and after each cell's own ``vertex`` (C,), between which its pose can be interpolated.
+
+    They are -1 where there is no such vertex, or where its cell is far away, lies on the wrong side or faces another way.
+    """
     neighbours = []
     for step in (-1, 1):
         other = vertex + step
@@ -190,7 +196,10 @@ def _ends(links: Predecessors) -> NDArray[np.bool_]:
 
 
 def _by_source(links: Predecessors) -> tuple[IntArray, IntArray]:
-    """The links by the cell that they come from: starts (C + 1,) of the rows, and the cells (K,) that they lead to."""
+    """The links sorted by the cell that they come from, in CSR form: row starts (C + 1,), and the cells (K,) that they lead to.
+
+    ``links`` is sorted by the cells that the links lead to; this is the transposed table, for ``likely_cells``.
+    """
     target = np.repeat(np.arange(len(links.start) - 1, dtype=np.int32), np.diff(links.start))
     order = np.argsort(links.paths.source, kind="stable")
     start = np.searchsorted(links.paths.source[order], np.arange(len(links.start))).astype(np.int32)
@@ -211,7 +220,7 @@ def likely_cells(places: PlaceMap, filtered: Float32Array, hypotheses: int) -> I
 
 @njit(cache=True)
 def _rows(numbers: IntArray, start: IntArray, values: IntArray) -> IntArray:
-    """The rows of these numbers of a table in CSR form, one after the other."""
+    """The rows ``numbers`` (n,) of a table in CSR form (row starts ``start``, entries ``values``), one after the other."""
     total = 0
     for i in numbers:
         total += start[i + 1] - start[i]
@@ -235,7 +244,10 @@ def margin(places: PlaceMap, filtered: Float32Array, best: int) -> float:
 
 @njit(cache=True)
 def _best_elsewhere(poses_m: FloatArray, filtered: Float32Array, best: int) -> float:
-    """The largest evidence farther than SAME_PLACE_M from the cell ``best``; minus infinity when there is none."""
+    """The evidence of the strongest rival of the cell ``best``, one farther away than SAME_PLACE_M; minus infinity without any.
+
+    ``poses_m`` (C, 3) are the poses of the cells, ``filtered`` (C,) is their evidence.
+    """
     rival = -math.inf
     for j in range(len(filtered)):
         sq_apart = (poses_m[j, 0] - poses_m[best, 0]) ** 2 + (poses_m[j, 1] - poses_m[best, 1]) ** 2
@@ -266,9 +278,10 @@ def interpolated_pose(places: PlaceMap, similarity: Float32Array, cell: int) -> 
 
 
 def drawn_to_lanes(poses_m: FloatArray, roads: RoadGeometry, share: FloatArray) -> FloatArray:
-    """Poses (N, 3) moved sideways by a ``share`` (N,) of their way to the lane's centre, where a single lane is near.
+    """Poses (N, 3) moved by a ``share`` (N,) of their way to the lane's centreline, to correct lateral errors of the map.
 
-    Only lanes that lead the same way count. With two of them, or none, the pose stays.
+    Drivers keep to about the middle of their lane. A pose is moved only if exactly one lane of its direction is near: with
+    several, it is unknown which of them was driven.
     """
     lanes = project(roads, poses_m[:, :2], LANE_REACH_M)
     same_way = np.abs(se2.wrap(lanes.heading_rad - poses_m[lanes.point, 2])) < SAME_WAY_RAD

@@ -75,7 +75,10 @@ class PlaceRecogniser:
         return (similarity - scored.mean) / max(scored.spread, self._spread_floor)
 
     def pose(self, match: PlaceMatch) -> FloatArray:
-        """Pose (3,) of the recognised cell, interpolated between views."""
+        """Pose (3,) in metres and rad at which the query frame was taken, judged by the recognised cell and its two neighbours.
+
+        The pose is interpolated between the cells by their similarities to the frame.
+        """
         similarity = np.full(len(self._places.poses_m), np.nan, dtype=np.float32)
         similarity[match.scored.cells] = match.scored.similarity
         return interpolated_pose(self._places, similarity, match.cell)

@@ -89,16 +89,16 @@ def closure_edges(closures: list[Closure], config: ExperienceMapConfig) -> Edges
 
 
 def with_median_offsets(closures: list[Closure], motions: FloatArray, config: ExperienceMapConfig) -> list[Closure]:
-    """The closures by target, each with the median along-track offset of those within ``steady_reach`` of it.
+    """The closures ordered by target, each with the median along-track offset of the closures within ``steady_reach`` of it.
 
     While two passes of a road run side by side, the offset between the nth keyframe of one and of the other stays what it is, but
     for odometry's error. A single view measures it by a parabola through three scores; the median over some 30 m halves that
     error and takes out the outliers. Over longer ways the drift of the scale would outweigh what the median gains.
 
     Args:
-        closures: in any order.
+        closures: loop closures in any order.
         motions: raw motion to each keyframe from the one before, (S, 3).
-        config: gives ``steady_reach``.
+        config: its ``steady_reach`` is used.
     """
     ordered = sorted(closures, key=lambda c: (c.target, c.source))
     way = np.cumsum(np.hypot(motions[:, 0], motions[:, 1]))
@@ -116,7 +116,7 @@ def with_median_offsets(closures: list[Closure], motions: FloatArray, config: Ex
 
 
 def concatenated(a: Edges, b: Edges) -> Edges:
-    """The edges of ``a``, then those of ``b``."""
+    """One set of edges that holds the edges of ``a``, then those of ``b``."""
     return Edges(
         source=np.concatenate([a.source, b.source]),
         target=np.concatenate([a.target, b.target]),
@@ -157,7 +157,11 @@ def relax_ratslam(poses: FloatArray, edges: Edges, correction: float, sweeps: in
 
 @njit(cache=True)
 def _relax(poses: FloatArray, source: IntArray, target: IntArray, motion: FloatArray, share: float, sweeps: int) -> FloatArray:
-    """Sweeps over the edges in place: each moves its source by minus, its target by plus ``share`` of its error."""
+    """The compiled part of ``relax_ratslam``: sweeps over the edges, which change ``poses`` (V, 3) in place.
+
+    The error of an edge is the pose at which its motion, seen from its source, puts the target, less the target's pose. The
+    target moves by ``share`` of the error, the source by as much the other way, so that the error becomes smaller.
+    """
     for _ in range(sweeps):
         for e in range(len(source)):
             a, b = source[e], target[e]

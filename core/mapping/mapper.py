@@ -62,7 +62,10 @@ class Mapper:
         self._neural_at: list[NeuralPose] = []  # the networks at each keyframe, once they have started
 
     def step(self, observation: Observation) -> None:
-        """Take one observation: path integration, and a keyframe where one is due and there is a frame."""
+        """Take one observation in: integrate its motion, and make a keyframe of its frame if one is due.
+
+        A keyframe whose place is recognised, perhaps together with keyframes shortly before it, closes loops.
+        """
         self._since_keyframe = keyframes.advance(self._since_keyframe, observation, self._config.view_step)
         self._integrate_paths(observation)
         if not keyframes.is_due(self._since_keyframe, self._config.view_step) or observation.frame is None:
@@ -73,10 +76,12 @@ class Mapper:
         self._since_keyframe = keyframes.restart(self._since_keyframe)
 
     def finish(self) -> CognitiveMap:
-        """The semi-metric cognitive map of everything seen.
+        """The semi-metric cognitive map of all observations so far, with its poses relaxed.
+
+        If the drive was too short for the attractor networks to start, their states are those of dead reckoning.
 
         Raises:
-            MappingError: the vehicle never moved with a frame in view.
+            MappingError: no keyframe was made, as there was no frame while the vehicle moved.
         """
         if not self._t_s:
             raise MappingError("the drive has no view: no frame was taken while the vehicle moved")

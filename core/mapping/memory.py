@@ -133,7 +133,7 @@ class PlaceMemory:
         return self._views.finished()
 
     def _filtered_evidence(self, scores: Float32Array, travelled: float, turned_rad: float, spacing: float) -> Evidence:
-        """The scores (C, shifts) of a view as z-scores, filtered along the graph with the evidence of the view before."""
+        """Sequence evidence for all cells after a new view: its scores (C, shifts) as z-scores, plus the evidence before it."""
         sequence = self._config.sequence
         floor = sequence.sigma_floor if self._config.view_cells.kind == "gradient" else sequence.grey_sigma_floor
         z = standardise(scores.max(axis=1), sequence.min_cells, floor)
@@ -174,9 +174,10 @@ class PlaceMemory:
         return Recognition(view.vertex, view.cell, margin, along, -shift * self._config.column_rad)
 
     def _along(self, view: _PendingView) -> float:
-        """Map units that a view lies ahead of its cell: where the parabola through the scores of three cells in a row peaks.
+        """How far, in map units, a view lies ahead of its cell along the road, more finely than cells are spaced.
 
-        The three are the cell, the one before it and the one after it on the road; 0 where one of them is missing.
+        It is the place at which the parabola through the scores of three cells peaks: the cell, the one before it and the one
+        after it on the road. It is 0 where one of them is missing.
         """
         links, best = self._graph.links, view.scores.max(axis=1)
         into, out_of = int(links.last_in[view.cell]), int(links.last_out[view.cell])
@@ -189,7 +190,10 @@ class PlaceMemory:
         return peak_of_values(behind, best[before], best[view.cell], ahead, best[after])
 
     def _store_oldest(self, spacing: float) -> None:
-        """Store the oldest pending view, as a cell of its own unless it was recognised, and link its cell to the one before."""
+        """Store the oldest pending view and link its cell to the cell of the keyframe before.
+
+        A view that was recognised shares the cell that it was recognised as; any other becomes a cell of its own.
+        """
         view = self._pending.popleft()
         cell, tolerance = view.cell, self._config.sequence.length_tolerance * spacing
         if cell < 0:

@@ -22,7 +22,7 @@ from hippodrome.core.types import AttractorStates, FloatArray
 
 @dataclass(frozen=True)
 class MapperAttractorConfig:
-    """The mapper's networks, and how strongly a recognised place speaks to them."""
+    """The mapper's networks, and how strongly a recognised place corrects them."""
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
 

@@ -41,7 +41,7 @@ def relax_pose_graph(poses: FloatArray, edges: Edges, config: PoseGraphConfig) -
     Args:
         poses: where the search begins, (V, 3); dead reckoning will do.
         edges: odometry and closures.
-        config: of the robust loss.
+        config: the robust loss, and when to stop.
     """
     if len(edges.source) == 0:
         return poses.copy()
@@ -79,7 +79,10 @@ def _sq_error(poses: FloatArray, edges: Edges) -> FloatArray:
 
 
 def _gauss_newton_step(poses: FloatArray, edges: Edges, weight: FloatArray) -> FloatArray:
-    """Poses after one Gauss-Newton step on the weighted squares of Eq. (11), Li et al. 2025; the first pose is no unknown."""
+    """Poses (V, 3) after one Gauss-Newton step on the sum of squares of Eq. (11), Li et al. 2025, weighted by ``weight`` (E,).
+
+    The first pose is held, as edges between poses do not determine where the whole map lies.
+    """
     sigma = edges.sigma / np.sqrt(np.maximum(weight, 1e-12))[:, None]
     residual, jacobian = local_residual(poses, edges.source, edges.target, edges.motion, sigma)
     free = csr_array(jacobian[:, 3:])

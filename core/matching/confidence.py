@@ -75,7 +75,11 @@ def match_status(route: Route, config: ConfidenceConfig, closures: Edges | None 
 
 
 def _explained(route: Route, config: ConfidenceConfig) -> BoolArray:
-    """Samples (T,) on the network around which the mean score of a step is high enough."""
+    """Mask (T,) of the samples at which the route explains the drive: it is on the network, and its steps score well enough.
+
+    Scores are averaged over a window around the sample, which is shorter at the ends of the drive, so that no single corner
+    decides.
+    """
     width = min(config.window, len(route.score_nats))
     kernel = np.ones(width)
     score = np.convolve(route.score_nats, kernel, "same") / np.convolve(np.ones(len(route.score_nats)), kernel, "same")
@@ -84,7 +88,9 @@ def _explained(route: Route, config: ConfidenceConfig) -> BoolArray:
 
 
 def reject_displaced(status: UInt8Array, route: Route, poses: FloatArray, config: ConfidenceConfig) -> UInt8Array:
-    """Status (S,) with the matched visits made ambiguous that the refinement moved too far: search and refinement disagree.
+    """Status (S,) of the visits, where matched visits that the refinement has moved too far are made ambiguous.
+
+    Search and refinement then disagree about the place, and neither is believed.
 
     Args:
         status: (S,) MatchStatus of each visit by the search.

@@ -27,7 +27,7 @@ _SCALE_STEP_NATS = 0.5  # cost of a change of scale by one bin: cheap, since the
 
 
 def on_parallel_lanes(line: RouteLine, network: RoadNetwork) -> BoolArray:
-    """Which samples (P,) of the line lie on a lane with an adjacent one."""
+    """Mask (P,) of the samples of the line that lie on a lane with an adjacent lane, so that either may have been driven."""
     return (line.lane >= 0) & network.has_adjacent_lane()[np.maximum(line.lane, 0)]
 
 

@@ -22,16 +22,20 @@ _STEP_SHARE = 0.1  # ... and this share of that length more, for the error of it
 
 
 def reproject(line: RouteLine, points_m: FloatArray, arc_m: FloatArray, reach_m: float) -> FloatArray:
-    """Project consecutive points onto a line, in driving order.
+    """Project the vertices of a driven path onto its route's line, so that they stay in driving order.
+
+    Each vertex may be projected onto the samples of the line around its present place. One sample for each is chosen by dynamic
+    programming: vertices should lie near their samples, and steps on the line should be as long as the driven ones. From the
+    sample the projection moves on to the foot of the perpendicular.
 
     Args:
         line: the route's line.
-        points_m: (S, 2) the points.
-        arc_m: (S,) present arc length of each point on the line.
-        reach_m: the projection lies within this arc length of the present one.
+        points_m: (S, 2) the vertices in driving order.
+        arc_m: (S,) present arc length of each vertex on the line.
+        reach_m: how far along the line a projection may move from the present arc length.
 
     Returns:
-        Arc length (S,) of each projection on the line.
+        New arc length (S,) of each vertex on the line.
     """
     spacing = (line.arc_m[-1] - line.arc_m[0]) / max(len(line.arc_m) - 1, 1)
     half_band = int(np.ceil(reach_m / spacing))
@@ -50,12 +54,12 @@ def reproject(line: RouteLine, points_m: FloatArray, arc_m: FloatArray, reach_m:
 
 @njit(cache=True)
 def _cheapest_path(cost: FloatArray, arc: FloatArray, driven: FloatArray) -> IntArray:
-    """The column (S,) of each row on the cheapest path through the band, by the Viterbi algorithm.
+    """The cheapest choice of one sample for each of S vertices, by the Viterbi algorithm: its index (S,) among W samples.
 
     Args:
-        cost: (S, W) cost of each sample of the band.
+        cost: (S, W) cost of projecting each vertex onto each of its W samples of the line.
         arc: (S, W) arc length of each sample.
-        driven: (S - 1,) metres between consecutive rows; steps of ``arc`` that differ from them cost, too.
+        driven: (S - 1,) metres driven between consecutive vertices; a step of ``arc`` that differs from them costs, too.
     """
     rows, columns = cost.shape
     total, parent = cost[0].copy(), np.zeros((rows, columns), np.int32)
@@ -74,7 +78,7 @@ def _cheapest_path(cost: FloatArray, arc: FloatArray, driven: FloatArray) -> Int
 
 @njit(cache=True, inline="always")
 def _cheapest_step(total: FloatArray, arc: FloatArray, i: int, j: int, driven_m: float) -> tuple[float, int]:
-    """Cheapest way to sample ``j`` of row ``i``: its cost, and the column of row ``i - 1`` that it comes from."""
+    """The cheapest step from a sample of vertex ``i - 1`` to sample ``j`` of vertex ``i``: the cost so far, and that sample."""
     sigma = _STEP_SIGMA_M + _STEP_SHARE * driven_m
     best, column = np.inf, 0
     for k in range(arc.shape[1]):

@@ -19,7 +19,7 @@ _BACK_M = 1.5  # positions may step back this much by rounding; farther back on 
 
 
 class Leg(NamedTuple):
-    """A part of the way on one lane, or (lane -1) straight ahead off the network."""
+    """A part of the route on one lane, or (lane -1) straight ahead off the network."""
 
     lane: int
     begin_m: float  # arc length on the lane; off the network 0
@@ -33,7 +33,7 @@ class Leg(NamedTuple):
 
 
 class _Passage(NamedTuple):
-    """From one lane to the next: at its end to a successor, or anywhere to an adjacent lane."""
+    """A move from one lane to another: from its end to a successor, or by a lane change to an adjacent lane."""
 
     from_lane: int
     left_at_m: float  # arc length on the lane that is left
@@ -42,7 +42,7 @@ class _Passage(NamedTuple):
 
 
 class _OpenLane(NamedTuple):
-    """A lane to be walked in search of a place, and how it was reached."""
+    """A lane on the stack of the depth-first search of ``_passages``, and how it was reached."""
 
     lane: int
     begin_m: float  # distance from the start of the walk to the lane's beginning, negative for the first lanes

@@ -18,7 +18,7 @@ from hippodrome.core.matching.search.track import Track
 from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.types import Edges, FloatArray
 
-_HALF_CHORD = 3  # steps (15 m) either side of a sample over which turning is taken: the length of a turn at a crossing
+_HALF_CHORD = 3  # steps (15 m) either side of a sample over which turning is measured: the length of a turn at a crossing
 _STRAIGHT_RAD = 0.15  # less turning over that chord may be a poor gyro's noise, a lane change or a kink of the lane
 _TURN_RAD = 0.5 * np.pi  # turning over that chord counts up to a right angle: U-turns do not count more
 _JUMP = 0.3  # a jump of the log scale by this much is either a rare restart of the odometry or a wrong turning of the route
@@ -55,7 +55,11 @@ def route_segments(route: Route, explained: BoolArray, nats_per_rad: float) -> l
 
 
 def turning_rad(track: Track) -> FloatArray:
-    """Turning (T,) at each sample: that over a chord around it, less what may be noise, spread evenly over the chord."""
+    """How much the vehicle turns at each sample (T,), in rad: the evidence for a route that turns likewise.
+
+    The change of heading over a chord around the sample, up to a right angle and less what may be noise, is divided by the number
+    of steps in the chord, so that the samples of a turn add up to the turn.
+    """
     index = np.arange(len(track.heading_rad))
     behind, ahead = np.maximum(index - _HALF_CHORD, 0), np.minimum(index + _HALF_CHORD, len(index) - 1)
     turned = np.minimum(np.abs(track.heading_rad[ahead] - track.heading_rad[behind]), _TURN_RAD)
@@ -66,12 +70,14 @@ def turning_rad(track: Track) -> FloatArray:
 def significant_segments(
     segments: list[RouteSegment], least_nats: float, least_joined_nats: float, start_known: bool
 ) -> list[RouteSegment]:
-    """The segments whose log-odds rule out chance.
+    """The segments whose log-odds are too high to be due to chance.
+
+    Once one segment is certain, dead reckoning ties the others to it, so that less evidence suffices for them.
 
     Args:
-        segments: of one route.
-        least_nats: log-odds at which one segment rules out that another network was driven.
-        least_joined_nats: log-odds that suffice for a segment once another one is certain, since dead reckoning joins the two.
+        segments: all segments of one route.
+        least_nats: log-odds from which on a segment is certain by itself.
+        least_joined_nats: log-odds that suffice for a segment once another one is certain.
         start_known: whether a start pose was given; the segment at the drive's beginning is certain then.
     """
     certain = [s for s in segments if s.log_odds_nats >= least_nats or (start_known and s.first == 0)]
@@ -88,7 +94,7 @@ def consistent_with_closures(
     repeated until all have ``least_share``.
 
     Args:
-        segments: of the route.
+        segments: the segments of the route.
         route: the matched route.
         closures: loop closures between visits.
         distant_m: ends of a closure farther apart than this are different places.

@@ -78,13 +78,16 @@ def apply(similarity: Similarity, poses: FloatArray) -> FloatArray:
 
 
 def align(poses: FloatArray, start: StartPose, geometry: RoadGeometry, config: AlignmentConfig) -> Alignment:
-    """The similarity that lays a map on the roads.
+    """Find the similarity that lays a map on the roads, from the start pose alone; the module describes the search.
 
     Args:
-        poses: of the map's vertices, (V, 3) in map units.
-        start: pose of the first vertex in the network's frame, about.
-        geometry: of the roads.
-        config: of the search.
+        poses: poses of the map's vertices, (V, 3) in map units.
+        start: approximate pose of the first vertex in the network's frame.
+        geometry: the roads.
+        config: limits and steps of the search.
+
+    Returns:
+        The best similarity, with its cost and the cost of the best one that differs from it.
     """
     roads = _sampled_roads(geometry, config.heading_lever_m)
     hypotheses = _scan(start, poses[0], config)
@@ -103,7 +106,10 @@ def align(poses: FloatArray, start: StartPose, geometry: RoadGeometry, config: A
 
 
 def _scan(start: StartPose, first: FloatArray, config: AlignmentConfig) -> FloatArray:
-    """The first hypotheses (H, 4): every scale with every rotation, each with the first vertex (3,) at the start pose."""
+    """The hypotheses (H, 4) that the search begins with: every scale with every rotation near the start heading.
+
+    The translation of each is such that the first vertex, at the pose ``first`` (3,) of the map, lies at the start position.
+    """
     steps = int(np.ceil(np.log(config.max_scale_m / config.min_scale_m) / np.log1p(config.scale_step)))
     scales = np.geomspace(config.min_scale_m, config.max_scale_m, steps + 1)
     turns = int(np.ceil(config.max_turn_rad / config.turn_step_rad))
@@ -114,7 +120,7 @@ def _scan(start: StartPose, first: FloatArray, config: AlignmentConfig) -> Float
 
 
 def _moved(hypotheses: FloatArray, poses: FloatArray) -> FloatArray:
-    """Poses (N, 3) of the map in the network's frame under each hypothesis, (H, N, 3)."""
+    """The poses (H, N, 3) in the network's frame at which each of H hypotheses puts the poses (N, 3) of the map."""
     a, b, tx, ty = (column[:, None] for column in hypotheses.T)
     x, y = a * poses[:, 0] - b * poses[:, 1] + tx, b * poses[:, 0] + a * poses[:, 1] + ty
     return np.stack([x, y, poses[:, 2] + np.arctan2(b, a)], axis=-1)
@@ -171,7 +177,10 @@ def _icp_step(
 
 
 def _rows(normal: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Derivatives (..., 4) by the hypothesis (a, b, x, y) of normal . p, p being where it puts the map's point (x, y)."""
+    """Derivatives (..., 4) of normal . p by the hypothesis (a, b, x, y), where p is the place at which it puts a map's point.
+
+    ``normal`` (..., 2) is the line's normal, ``x`` and ``y`` (...) are the point in map units.
+    """
     n_x, n_y = normal[..., 0], normal[..., 1]
     return np.stack([n_x * x + n_y * y, n_y * x - n_x * y, n_x, n_y], axis=-1)
 
@@ -189,7 +198,7 @@ def _distinct(hypotheses: FloatArray, costs: FloatArray, config: AlignmentConfig
 
 
 def _rotation(hypotheses: FloatArray) -> FloatArray:
-    """Rotation (H,) of each hypothesis."""
+    """Rotation (H,) from map to network frame of each hypothesis (H, 4), in rad."""
     return np.arctan2(hypotheses[:, 1], hypotheses[:, 0])
 
 
@@ -213,7 +222,7 @@ class _Roads:
 
 
 def _sampled_roads(geometry: RoadGeometry, lever_m: float) -> _Roads:
-    """A sample in the middle of every piece of lane of about ``_ROAD_SPACING_M``."""
+    """Samples of all lanes, at most ``_ROAD_SPACING_M`` apart; each is the middle of an equal piece of its lane."""
     pieces = np.maximum(1, np.ceil(geometry.lane_length_m / _ROAD_SPACING_M).astype(np.int32))
     lane = np.repeat(np.arange(len(pieces), dtype=np.int32), pieces)
     piece = np.arange(len(lane)) - np.repeat(np.cumsum(pieces) - pieces, pieces)

@@ -35,16 +35,27 @@ def posterior_covariance(state: State, factors: Factors, closures: Edges) -> Flo
 
 
 def _near_end(near: FloatArray, far: FloatArray, far_covariance: FloatArray) -> FloatArray:
-    """Jacobians J (N, M, 4) of the near end, whitened by the uncertainty of the far one: L^-1 J with L L^T = 1 + K P K^T."""
-    spread = np.eye(near.shape[1]) + far @ far_covariance @ np.swapaxes(far, 1, 2)
-    whitened: FloatArray = np.linalg.solve(np.linalg.cholesky(spread), near)
+    """Jacobians of closures by their near ends that take the uncertainty of the far ends into account, (N, M, 4).
+
+    They are L^-1 J with L L^T = 1 + K P K^T (see ``posterior_covariance``), so that their normal equations are
+    J^T (1 + K P K^T)^-1 J.
+
+    Args:
+        near: J, the whitened Jacobians by the near end's unknowns, (N, M, 4).
+        far: K, the same by the far end's unknowns.
+        far_covariance: P, the covariance of the far end's unknowns, (N, 4, 4).
+    """
+    residual_covariance = np.eye(near.shape[1]) + far @ far_covariance @ np.swapaxes(far, 1, 2)
+    whitened: FloatArray = np.linalg.solve(np.linalg.cholesky(residual_covariance), near)
     return whitened
 
 
 def with_systematic_errors(covariance: FloatArray, survey_sigma_m: float) -> FloatArray:
-    """The formal covariance (S, 4, 4) plus what never averages out: how lanes are driven, and the network's own error.
+    """The formal covariance (S, 4, 4) plus the errors that do not average out along a lane.
 
-    Both are errors across the lane, but in bends an error across the lane is one along it too, so that both axes get them.
+    These are the distance between the lane as driven and as drawn, and the network's own error, with a standard deviation of
+    ``survey_sigma_m``. Both are errors across the lane, but in bends an error across the lane is one along it too, so that they
+    are added to both axes.
     """
     place = PLACE_SIGMA_M**2 + survey_sigma_m**2
     return covariance + np.diag([place, place, HEADING_SIGMA_RAD**2, 0.0])

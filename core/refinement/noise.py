@@ -38,7 +38,10 @@ class Noise:
     road_inverse_freedom: float = 1.0  # the same of the road's residuals: 1 is Cauchy, as turns are drawn otherwise than driven
 
     def step_sigmas(self, length_m: FloatArray) -> FloatArray:
-        """Sigmas (N, 4) of along, across, heading and log scale over steps of the given lengths (N,)."""
+        """Standard deviations (N, 4) of odometry over steps of the given lengths (N,): along, across, heading, log scale.
+
+        They grow with the root of the length, as those of a random walk do.
+        """
         root = np.sqrt(np.maximum(length_m, STANDSTILL_M))[:, None]
         sigmas: FloatArray = root * np.array([self.along, self.across, self.heading, self.log_scale])
         return sigmas
@@ -77,9 +80,9 @@ def rescaled(noise: Noise, odometry: FloatArray, road: FloatArray, closure_media
     """The noise with its sigmas times the roots of variance factors, kept above ``FLOORS``.
 
     Args:
-        noise: so far.
-        odometry: variance factors of along, across, heading, log scale, (4,).
-        road: variance factors of across the lane and heading, (2,) or more; the rest is ignored.
+        noise: the noise so far.
+        odometry: variance factors of odometry: along, across, heading, log scale, (4,).
+        road: variance factors of the road: across the lane and heading, (2,) or more; the rest is ignored.
         closure_median_sq: median over the closures of their squared whitened residual of three components, without robust weight;
             None without closures. A median, as closures may be false.
     """

@@ -58,10 +58,10 @@ def refine_paper(cognitive_map: CognitiveMap, network: RoadNetwork, start: Start
     none.
 
     Args:
-        cognitive_map: semi-metric.
+        cognitive_map: a semi-metric map.
         network: the roads.
-        start: pose of the first vertex.
-        config: of the mode.
+        start: pose of the first vertex in the network's frame.
+        config: constants of the mode.
     """
     geometry = road_geometry(network)
     answer = _rigid_answer(cognitive_map, geometry, start, config)
@@ -73,7 +73,7 @@ def refine_paper(cognitive_map: CognitiveMap, network: RoadNetwork, start: Start
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Answer:
-    """A map laid on the roads in one way or the other."""
+    """A map laid on the roads, as one piece or bent on to them."""
 
     poses: FloatArray  # (V, 3) network frame
     alignment: Alignment
@@ -101,7 +101,11 @@ def _grown_answer(cognitive_map: CognitiveMap, geometry: RoadGeometry, start: St
 def _matched_and_optimised(
     poses: FloatArray, alignment: Alignment, edges: Edges, geometry: RoadGeometry, config: PaperRefineConfig, grown: bool
 ) -> _Answer:
-    """``rounds`` of match and optimise. An unmatched vertex costs as much as one that is matched at the search radius."""
+    """Match aligned poses (V, 3) to the roads and optimise them, ``rounds`` times in turn.
+
+    In the cost of the answer an unmatched vertex counts as one that was matched at the search radius, so that an answer cannot
+    become cheap by leaving the roads.
+    """
     matched = match(poses, geometry, config.matching)
     poses, cost = minimise_topometric_cost(poses, edges, matched, config)
     for _ in range(config.rounds - 1):
@@ -112,15 +116,20 @@ def _matched_and_optimised(
 
 
 def bend_onto_roads(poses: FloatArray, edges: Edges, geometry: RoadGeometry, config: PaperRefineConfig) -> FloatArray:
-    """Bend an aligned map on to the roads from its beginning: match and optimise a window, carry the rest along, move on.
+    """Bend an aligned map on to the roads, window by window from its beginning, where no single similarity fits the whole map.
 
-    For maps that no similarity fits: heading and scale may drift as far as they like if they do so slowly.
+    The last vertices laid on the roads so far are a window, which is matched to the roads and optimised. The vertices after it
+    then follow rigidly, rescaled by how much the window was stretched, and the window moves on. So heading and scale may drift
+    far over the whole map, as long as they drift slowly.
 
     Args:
-        poses: aligned, (V, 3) in the network's frame.
-        edges: of the map, in metres at the alignment's scale.
-        geometry: of the roads.
-        config: of the window and its steps.
+        poses: poses of the aligned map, (V, 3) in the network's frame.
+        edges: edges of the map, in metres at the alignment's scale.
+        geometry: the roads.
+        config: length and steps of the window.
+
+    Returns:
+        The bent poses, (V, 3).
     """
     scale = 1.0  # metres of the window per metre of ``edges``
     for end in range(config.growth_step, len(poses) + config.growth_step, config.growth_step):
@@ -194,9 +203,10 @@ def minimise_topometric_cost(
     vertex = np.flatnonzero(matched.lane >= 0).astype(np.int32)
 
     def linearise(state: FloatArray) -> tuple[FloatArray, csr_array]:
-        at = state.reshape(-1, 3)
-        local = local_residual(at, edges.source, edges.target, edges.motion, edges.sigma)
-        global_ = global_residual(at, vertex, matched.matched_m[vertex])
+        """Residual of Eq. (12) and its Jacobian at the flattened poses (3 V,)."""
+        poses_now = state.reshape(-1, 3)
+        local = local_residual(poses_now, edges.source, edges.target, edges.motion, edges.sigma)
+        global_ = global_residual(poses_now, vertex, matched.matched_m[vertex])
         return total_residual(local, global_, config.local_weight, config.global_weight)
 
     found = gauss_newton(linearise, poses.ravel(), max_iterations=config.max_iterations, tolerance=1e-4, damping=DAMPING)

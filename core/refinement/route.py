@@ -77,7 +77,10 @@ def _line_and_places(route: Route, network: RoadNetwork) -> tuple[RouteLine, Flo
 
 
 def keyframe_closures(cognitive_map: CognitiveMap) -> Edges:
-    """The map's closures as edges between keyframes: in place of each vertex stands the keyframe that made it."""
+    """The map's loop closures as edges between keyframes, whose poses are the unknowns of the solver.
+
+    In place of each vertex stands the keyframe that made it.
+    """
     closures = edges_where(cognitive_map.edges, cognitive_map.edges.kind == EdgeKind.CLOSURE)
     first = first_keyframes(cognitive_map)
     return replace(closures, source=first[closures.source], target=first[closures.target])
@@ -94,7 +97,7 @@ def first_keyframes(cognitive_map: CognitiveMap) -> IntArray:
 def _refinement(
     cognitive_map: CognitiveMap, network: RoadNetwork, line: RouteLine, solution: RouteSolution, keyframe_status: UInt8Array
 ) -> Refinement:
-    """The solution at the keyframes (S) as a map of V vertices, with breaks and estimates."""
+    """The answer of the mode: the solution for S keyframes as a map of V vertices, with breaks and estimates."""
     first = first_keyframes(cognitive_map)
     status = keyframe_status[first]
     refined = replace(
@@ -118,14 +121,17 @@ def _road_match(network: RoadNetwork, line: RouteLine, arc_m: FloatArray, status
 
 
 def _covariance(covariance: FloatArray, network: RoadNetwork, status: UInt8Array) -> FloatArray:
-    """The covariance (V, 3, 3); where the route is ambiguous the variance of a place anywhere in the network is added."""
+    """The covariance (V, 3, 3) of the poses, enlarged where the route is ambiguous, as the vertex may then be anywhere.
+
+    The variance of the positions of all lanes in the network is added there.
+    """
     anywhere = np.diag([*np.var(network.points_m, axis=0), 0.0])
     added: FloatArray = covariance + (status == MatchStatus.AMBIGUOUS)[:, None, None] * anywhere
     return added
 
 
 def _estimates(solution: RouteSolution) -> dict[str, float]:
-    """What the refinement estimated besides the poses, by names with units."""
+    """What the refinement has estimated besides the poses, for reports: name, with its unit, to value."""
     noise = solution.noise
     return {
         "odometry_along_m_per_root_m": noise.along,

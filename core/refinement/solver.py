@@ -61,20 +61,21 @@ def refine_along_route(
     free: BoolArray,
     config: SolverConfig,
 ) -> RouteSolution:
-    """The most likely poses and scales of S keyframes along a route.
+    """The most likely poses and scales of S keyframes along a route, with their covariances and the noise of all factors.
 
-    Every round draws the keyframes to the points of the line that they are nearest to. The first rounds hold them there
-    lengthwise, ever more loosely, so that they find their place; the later ones do not, while the estimates of the noise settle.
+    Every round projects the keyframes onto the line, takes a few Gauss-Newton steps, and estimates the noise anew. The first
+    rounds hold the keyframes to their projections also along the line, ever more loosely, so that they find their places. The
+    later rounds hold them across the line only.
 
     Args:
         visits: raw motions of the keyframes.
-        closures: edges between keyframes.
-        line: the route.
-        arc_m: first guess of each keyframe's place on the line, (S,).
+        closures: loop closures between keyframes.
+        line: the line of the route, P samples.
+        arc_m: first guess of each keyframe's arc length on the line, (S,).
         log_scale: first guess of ln(metres per map unit), (S,).
-        vouched: 1 where a keyframe is known to be on this road, 0 where it is not, (S,).
-        free: samples of the line at which its lane may be the wrong one of several in parallel, (P,).
-        config: of the rounds.
+        vouched: 1 where a keyframe is believed to be on the road of the route, 0 where it may be off the network, (S,).
+        free: mask (P,) of the samples of the line whose lane may be the wrong one of several parallel ones.
+        config: number and constants of the rounds.
     """
     points, heading = points_on_line(line, arc_m)
     state = State(np.column_stack([points, heading]), log_scale, np.zeros(2))
@@ -94,14 +95,20 @@ def refine_along_route(
 
 
 def prior_scale_step_variance(state: State, visits: Visits, noise: Noise) -> FloatArray:
-    """Variance (S - 1,) of the steps of the log scale before any data: that of a random walk over the driven metres."""
+    """Prior variance (S - 1,) of the change of the log scale between consecutive keyframes.
+
+    The log scale is a random walk, whose variance grows with the driven metres.
+    """
     metres = np.exp(state.log_scale[:-1]) * np.hypot(visits.motion[1:, 0], visits.motion[1:, 1])
     variance: FloatArray = noise.step_sigmas(metres)[:, 3] ** 2
     return variance
 
 
 def curvature(line: RouteLine, arc_m: FloatArray, half_m: float = 4.0) -> FloatArray:
-    """Curvature (S,) of the line in 1/m, without sign, over ``half_m`` (a car's length) either way of arc lengths (S,)."""
+    """Absolute curvature (S,) of the line in 1/m at the arc lengths (S,), as roads hold a vehicle less tightly in bends.
+
+    It is the change of heading from ``half_m`` (a car's length) behind to as far ahead, over that distance.
+    """
     heading = np.unwrap(line.heading_rad)
     turned = np.interp(arc_m + half_m, line.arc_m, heading) - np.interp(arc_m - half_m, line.arc_m, heading)
     magnitude: FloatArray = np.abs(turned) / (2.0 * half_m)
@@ -152,10 +159,11 @@ def estimate_noise(
     scale_step_variance: FloatArray,
     factor: ChainFactor,
 ) -> tuple[Noise, FloatArray]:
-    """Noise from the squared whitened residuals per degree of freedom left, and the posterior ``scale_step_variance`` (S - 1,).
+    """The noise as estimated from the residuals, and the posterior variance (S - 1,) of each step of the log scale.
 
-    The variance of each predicted residual, J Sigma J^T with Sigma from ``factor``, is the share of a degree of freedom that the
-    solution used up; that of a step of the scale, taken back to its unit, is what the data leave open about the step.
+    Variances are the squared whitened residuals per degree of freedom that the solution has left (``variance_factors``). The
+    variance J Sigma J^T of a predicted residual, with Sigma from ``factor``, is the share of a degree of freedom that was used
+    up. For a step of the scale, without its robust weight and times the prior variance, it is the step's posterior variance.
     """
     odometry, road, closing = all_factors(state, visits, closures, targets, noise, scale_step_variance)
     own, next_ = marginals(factor)

@@ -26,7 +26,7 @@ SHORTEST_LANE_M = 1e-6  # stands in for the length of a lane that is a single po
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoadGeometry:
-    """A network of L lanes as S straight centreline segments, laid out for vectorised queries. Made by ``road_geometry``."""
+    """A network of L lanes as S straight centreline segments, in arrays for vectorised queries. Made by ``road_geometry``."""
 
     network: RoadNetwork
     lane_length_m: FloatArray  # (L,)
@@ -82,7 +82,9 @@ def road_geometry(network: RoadNetwork) -> RoadGeometry:
 
 
 def poses_on_segments(geometry: RoadGeometry, lane: IntArray, position_m: FloatArray) -> FloatArray:
-    """Poses (N, 3) at arc lengths on lanes, reached from the beginning of the segment along its direction.
+    """Poses (N, 3) at arc lengths on lanes: the point on the centreline, and the heading of its segment there.
+
+    The point is reached from the beginning of the segment along its unit direction; the module says why this matters.
 
     Args:
         geometry: the network's segments.
@@ -117,7 +119,10 @@ def points_between_vertices(network: RoadNetwork, lane: IntArray, position_m: Fl
 
 
 def chord_headings(network: RoadNetwork, lane: IntArray, position_m: FloatArray, half_chord_m: float) -> FloatArray:
-    """Direction (N,) of the chord from ``half_chord_m`` behind to as far ahead of each position, cut at the lane's ends."""
+    """Driving direction (N,) in rad at arc lengths ``position_m`` (N,) of lanes (N,), smoothed over the joints of the centreline.
+
+    It is the direction of the chord from ``half_chord_m`` behind to as far ahead of each position, cut at the lane's ends.
+    """
     lane_end_m = network.lane_lengths_m()[lane]
     ahead = points_between_vertices(network, lane, np.minimum(position_m + half_chord_m, lane_end_m))
     behind = points_between_vertices(network, lane, np.maximum(position_m - half_chord_m, 0.0))

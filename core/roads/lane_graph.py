@@ -100,7 +100,11 @@ def reversed_network(network: RoadNetwork) -> RoadNetwork:
 
 
 def mirrored(graph: LaneGraph, bins: IntArray) -> IntArray:
-    """The bins (K,) of the reversed network's graph that cover the same places; negative ones (off the network) stay."""
+    """Numbers (K,) of the bins of the reversed network's graph that cover the same places as ``bins`` (K,) of this ``graph``.
+
+    A search that runs back in time uses that graph. It has the bins of each lane in reverse order. Negative numbers, which mean
+    places off the network, stay as they are.
+    """
     lane = graph.lane[np.maximum(bins, 0)]
     return np.where(bins >= 0, graph.lane_start[lane] + graph.lane_start[lane + 1] - 1 - bins, bins).astype(np.int32)
 
@@ -152,7 +156,7 @@ class _Lanes(NamedTuple):
 
 
 class _Ahead(NamedTuple):
-    """Bins that lie ahead, row by row."""
+    """Bins that lie ahead of a bin, with their distances and the lane changes on the way, one row each."""
 
     bin: IntArray
     distance_m: Float32Array

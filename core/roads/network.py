@@ -61,7 +61,7 @@ class RoadNetwork:
         return running
 
     def lane_lengths_m(self) -> FloatArray:
-        """Arc length (L,) of each centreline as drawn (SUMO's own ``length`` attribute may differ)."""
+        """Length (L,) of each lane along its centreline as drawn; SUMO's own attribute ``length`` may differ."""
         running = self.running_length_m()
         lengths: FloatArray = running[self.point_start[1:] - 1] - running[self.point_start[:-1]]
         return lengths

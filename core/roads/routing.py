@@ -80,7 +80,10 @@ def route_distances_m(
 
 
 def _successors(geometry: RoadGeometry, carriageway: IntArray, count: int) -> tuple[IntArray, IntArray]:
-    """Carriageways that follow each carriageway, each once, as (start (C + 1,), carriageway)."""
+    """The carriageways that follow each of C = ``count`` carriageways, each once, in CSR form.
+
+    ``carriageway`` (L,) has the carriageway of each lane. Returns the row starts (C + 1,) and the following carriageways (K,).
+    """
     network = geometry.network
     source = np.repeat(carriageway, np.diff(network.successor_start)).astype(np.int64)
     key = np.unique(source * count + carriageway[network.successor])
@@ -162,7 +165,7 @@ def _dijkstra(graph: _CarriagewayGraph, source: int, bound_m: float, gap: FloatA
 
 @njit(cache=True)
 def _pair_distances(first: NDArray[np.int64], candidates: _Candidates, drives: _Drives) -> FloatArray:
-    """Driving distance of every pair, in the order that ``route_distances_m`` tells."""
+    """Driving distance in metres of every pair of candidates, in the order that ``route_distances_m`` describes."""
     distances = np.full(first[-1], np.inf)
     start = candidates.start
     for t in range(len(first) - 1):

@@ -64,12 +64,12 @@ def solve(factor: ChainFactor, rhs: FloatArray, rhs_border: FloatArray) -> tuple
     """A^-1 times a right-hand side (b, c), by block elimination: z = S^-1 (c - C^T T^-1 b), x = T^-1 b - T^-1 C z.
 
     Args:
-        factor: of A.
-        rhs: b (V, B).
-        rhs_border: c (G,).
+        factor: the factorised matrix A.
+        rhs: right-hand side b of the blocks, (V, B).
+        rhs_border: right-hand side c of the border, (G,).
 
     Returns:
-        x (V, B) and z (G,).
+        The solution: its blocks x (V, B) and its border z (G,).
     """
     inner = _solve_blocks(factor.inverse_pivot, factor.gain, rhs)
     border = factor.inverse_corner @ (rhs_border - np.einsum("vbg,vb->g", factor.border, inner))
@@ -137,9 +137,16 @@ def solve_coupled(
 
 @njit(cache=True)
 def _factorise_blocks(diagonal: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Block LDL^T, forwards from P_0 = T_0: G_v = P_v^-1 U_v, P_{v+1} = T_{v+1} - U_v^T G_v; returns all P_v^-1 and G_v.
+    """Factorise the block-tridiagonal matrix T as L diag(P_v) L^T, where L is unit lower block-bidiagonal with blocks G_v^T.
 
-    Then T = L diag(P_v) L^T, L unit lower block-bidiagonal with the blocks G_v^T.
+        P_0 = T_0,    G_v = P_v^-1 U_v,    P_{v+1} = T_{v+1} - U_v^T G_v
+
+    Args:
+        diagonal: T_v (V, B, B).
+        upper: U_v (V - 1, B, B).
+
+    Returns:
+        All P_v^-1 (V, B, B) and all G_v (V - 1, B, B).
     """
     inverse_pivot, gain = np.empty_like(diagonal), np.empty_like(upper)
     pivot = diagonal[0].copy()
@@ -154,7 +161,10 @@ def _factorise_blocks(diagonal: FloatArray, upper: FloatArray) -> tuple[FloatArr
 
 @njit(cache=True)
 def _solve_blocks(inverse_pivot: FloatArray, gain: FloatArray, rhs: FloatArray) -> FloatArray:
-    """T^-1 b (V, B): forwards y_v = b_v - G_{v-1}^T y_{v-1}, then backwards x_v = P_v^-1 y_v - G_v x_{v+1}."""
+    """Solve T x = b for x (V, B), with T factorised by ``_factorise_blocks``.
+
+    Forwards y_v = b_v - G_{v-1}^T y_{v-1}, then backwards x_v = P_v^-1 y_v - G_v x_{v+1}.
+    """
     count, n = rhs.shape
     y, x = rhs.copy(), np.empty_like(rhs)
     for v in range(1, count):
@@ -189,7 +199,7 @@ def _marginal_blocks(inverse_pivot: FloatArray, gain: FloatArray) -> tuple[Float
 
 @njit(cache=True)
 def _inverse(a: FloatArray) -> FloatArray:
-    """Inverse of a small symmetric positive definite matrix A = L L^T through its Cholesky factor: L^-T L^-1."""
+    """Inverse of a small symmetric positive definite matrix A (n, n) = L L^T from its Cholesky factor L: L^-T L^-1."""
     n = a.shape[0]
     inverse_lower = _inverse_of_lower(_cholesky(a))
     out = np.zeros((n, n))
@@ -218,7 +228,7 @@ def _cholesky(a: FloatArray) -> FloatArray:
 
 @njit(cache=True, inline="always")
 def _inverse_of_lower(lower: FloatArray) -> FloatArray:
-    """L^-1 by forward substitution, column by column."""
+    """Inverse of a small lower triangular matrix L (n, n), by forward substitution, column by column."""
     n = lower.shape[0]
     inverse = np.zeros((n, n))
     for column in range(n):

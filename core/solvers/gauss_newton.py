@@ -105,5 +105,5 @@ def _accept(
 
 
 def _cost(residual: FloatArray) -> float:
-    """Half the sum of squared residuals."""
+    """Half the sum of squared residuals (m,): what Gauss-Newton minimises."""
     return 0.5 * float(residual @ residual)

@@ -17,7 +17,7 @@ POSE_SIZE = 3
 
 
 def global_residual(poses: FloatArray, vertex: IntArray, matched_m: FloatArray) -> tuple[FloatArray, csr_array]:
-    """Eq. (10), Li et al. 2025: r_t = p_t - z_t, the way from a vertex's place on its road to the vertex.
+    """Eq. (10), Li et al. 2025: r_t = p_t - z_t, the vector to a vertex from its matched position on the road.
 
     Args:
         poses: (V, 3) m, m, rad.

@@ -68,7 +68,10 @@ class ViewCellConfig:
 
 
 def describe(frame: Frame, config: ViewCellConfig) -> Descriptor:
-    """Template of a frame of any size, colour or grey: (D,) int8 for "gradient", uint8 for "grey"; D = prod(config.shape)."""
+    """The descriptor of a frame of any size, in colour or grey: (D,) int8 for "gradient", uint8 for "grey".
+
+    D is the product of ``config.shape``. Sky and road are cut off first, as they tell no place.
+    """
     height = frame.shape[0]
     crop = frame[round(config.top * height) : round(config.bottom * height)]
     grey: Frame = crop if crop.ndim == 2 else np.asarray(cv2.cvtColor(crop, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
@@ -110,9 +113,10 @@ def _orientation_histogram(dx: NDArray[Any], dy: NDArray[Any], cell_px: int, bin
 
 @njit(cache=True)
 def _normalise_blocks(histogram: Float32Array, contrast_floor: np.float32) -> Int8Array:
-    """Each cell's histogram over the length of its block of 3 x 3 cells, as int8 and flattened column by column, (D,).
+    """The descriptor (D,): histograms (rows, columns, bins) made independent of the local contrast, as in HOG.
 
-    The squared length of a block is its gradient energy plus the squared ``contrast_floor``.
+    Each cell's histogram is divided by the norm of the block of 3 x 3 cells around it. The squared ``contrast_floor`` is part of
+    the squared norm, so that noise is not amplified where there are no gradients. Entries are flattened column by column.
     """
     rows, columns, bins = histogram.shape
     energy = _cell_energies(histogram)
@@ -153,7 +157,11 @@ def _block_energy(energy: Float32Array, y: int, x: int, floor: np.float32) -> np
 
 
 def _describe_grey(grey: Frame, config: ViewCellConfig) -> UInt8Array:
-    """The shrunken image, each pixel minus the mean and over the standard deviation of its neighbourhood, as bytes (D,)."""
+    """RatSLAM's descriptor (D,): a small image whose pixels are normalised, so that it does not depend on the light.
+
+    From each pixel the mean of its neighbourhood is subtracted, and the difference is divided by the standard deviation there.
+    Pixels are stored as bytes around 128, column by column.
+    """
     rows, columns = config.grey_px
     small = cv2.resize(grey, (columns, rows), interpolation=cv2.INTER_AREA).astype(np.float32)
     patch = (config.grey_patch_px, config.grey_patch_px)

@@ -56,7 +56,7 @@ class CellGraph:
 
     @property
     def links(self) -> Links:
-        """All links so far; the arrays are views of the graph's own and must not be written to."""
+        """All links so far. The arrays share memory with the graph and must not be written to."""
         return _first_of(self._links, self.cell_count, self._link_count)
 
     def add_cell(self) -> int:
@@ -116,7 +116,7 @@ def _empty_links(cells: int, links: int) -> Links:
 
 
 def _first_of(links: Links, cells: int, count: int) -> Links:
-    """Views of the first ``cells`` cells and the first ``count`` links."""
+    """The first ``cells`` cells and the first ``count`` links, as slices that share memory with ``links``."""
     return Links(
         last_in=links.last_in[:cells],
         last_out=links.last_out[:cells],
@@ -130,7 +130,7 @@ def _first_of(links: Links, cells: int, count: int) -> Links:
 
 
 def _copied_into(larger: Links, links: Links) -> Links:
-    """``larger`` with the cells and links of ``links`` in its first places."""
+    """Copy the cells and links of ``links`` into the first places of ``larger``, in place; returns ``larger``."""
     first = _first_of(larger, len(links.last_in), len(links.source))
     for name in Links._fields:
         getattr(first, name)[:] = getattr(links, name)

@@ -56,7 +56,11 @@ def start() -> KeyframeState:
 
 
 def advance(state: KeyframeState, observation: Observation, config: KeyframeConfig) -> KeyframeState:
-    """The state after one more observation: its motion is added, and its speed counts for what is typical."""
+    """The state after one more observation, whose motion is added and whose speed goes into the histogram of speeds.
+
+    Path length and turn, which decide whether a keyframe is due, grow only while the vehicle moves: the odometry of a standing
+    vehicle is noise.
+    """
     speed, dt_s = abs(observation.speed), observation.dt_s
     first = state.first_speed or speed
     histogram, spacing, slowest = state.histogram, state.spacing, state.slowest
@@ -102,12 +106,18 @@ def arc_motion(length: float, turn_rad: float) -> FloatArray:
 
 
 def _bin(speed: float, first: float) -> int:
-    """Bin of a speed; the outermost bins take everything beyond."""
+    """Bin of a speed in the histogram of log speeds, whose middle bin is that of the ``first`` speed.
+
+    The outermost bins also hold the speeds beyond them.
+    """
     return HALF_RANGE + max(-HALF_RANGE, min(HALF_RANGE, round(BINS_PER_E * math.log(speed / first))))
 
 
 def _typical_and_slowest(histogram: IntArray, first: float, moving_share: float) -> tuple[float, float]:
-    """Median speed while moving, and the speed up to which the vehicle counts as standing."""
+    """Median speed while moving, and the speed up to which the vehicle counts as standing still.
+
+    The latter is ``moving_share`` of the 90th percentile of all speeds.
+    """
     fast, typical = _quantile_bins(histogram, BINS_PER_E * math.log(moving_share))
     speed = first * math.exp((typical - HALF_RANGE) / BINS_PER_E)
     return speed, moving_share * first * math.exp((fast - HALF_RANGE) / BINS_PER_E)

@@ -114,7 +114,10 @@ def _grey(frame: Frame) -> Grey:
 
 
 def track_corners(before: Grey, after: Grey) -> tuple[FloatArray, FloatArray]:
-    """Pixels (N, 2) of the same corners in both frames (Lucas-Kanade), without those that do not come back when tracked back."""
+    """Pixels (N, 2) of the same corners in the frames before and after, by Lucas-Kanade tracking.
+
+    A corner that is not found again where it began, when it is tracked back, was lost and is left out.
+    """
     corners = cv2.goodFeaturesToTrack(before, CORNERS, CORNER_QUALITY, CORNER_PX)
     if corners is None:
         return np.zeros((0, 2)), np.zeros((0, 2))

@@ -61,6 +61,6 @@ def peak_in_row(values: Float32Array, best: int) -> float:
 
 
 def peak_shift(scores: Float32Array) -> float:
-    """Shift (columns, with a fraction) at which the scores (2 n + 1,) of the shifts -n to n peak."""
+    """Sideways shift in columns, to a fraction of a column, at which the scores (2 n + 1,) of the shifts -n to n are largest."""
     best = int(np.argmax(scores))
     return best - len(scores) // 2 + peak_in_row(scores, best)

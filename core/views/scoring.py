@@ -34,14 +34,14 @@ class ViewCellBank:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QueryMean:
-    """Running mean of the query descriptors of late: what the present light adds to all of them."""
+    """Running mean of the latest query descriptors: what they all share, such as the present light. It tells no place."""
 
     mean: Float32Array  # (D,)
     count: int  # number of views in it; a mean from elsewhere counts for as many as it is trusted for
 
 
 def bank_of(cells: ViewCells) -> ViewCellBank:
-    """The stored views of a map, ready to be scored."""
+    """The stored views of a map as a bank, against which queries can be scored."""
     return make_bank(cells.kind, cells.shape, cells.templates, cells.mean)
 
 
@@ -55,7 +55,7 @@ def make_bank(kind: Kind, shape: tuple[int, ...], templates: Descriptor, mean: F
 
 
 def template_mean(kind: Kind, templates: Descriptor) -> Float32Array:
-    """What all views (C, D) share, (D,): their mean for "gradient", zeros for "grey", which subtracts nothing."""
+    """What all views (C, D) share, which scoring subtracts, (D,): their mean for "gradient"; zeros for "grey"."""
     if kind == "grey" or len(templates) == 0:
         return np.zeros(templates.shape[1], dtype=np.float32)
     mean: Float32Array = templates.mean(axis=0, dtype=np.float32)
@@ -68,7 +68,10 @@ def start_query_mean(mean: Float32Array, count: int = 0) -> QueryMean:
 
 
 def update_query_mean(state: QueryMean, descriptor: Descriptor, config: ViewCellConfig) -> QueryMean:
-    """The running mean with one more view (D,): a plain average at first, then forgetting with a horizon of ``mean_horizon``."""
+    """The running mean of the queries, which ``score`` subtracts from each query, after one more view (D,).
+
+    It is the plain average of the first ``mean_horizon`` views. Later it is an exponential average, which follows the light.
+    """
     weight = np.float32(1.0 / min(state.count + 1, config.mean_horizon))
     return QueryMean(state.mean + weight * (descriptor - state.mean), state.count + 1)
 
@@ -83,8 +86,8 @@ def score(bank: ViewCellBank, descriptor: Descriptor, query_mean: QueryMean, con
     Args:
         bank: C stored views.
         descriptor: the query, (D,).
-        query_mean: of the queries of late.
-        config: of the views; its ``max_shift`` is used.
+        query_mean: running mean of the latest queries.
+        config: how views are compared; its ``max_shift`` is used.
 
     Returns:
         (C, 2 max_shift + 1). Column ``max_shift + s`` compares the query moved ``s`` columns to the right; the best shift is
@@ -109,9 +112,10 @@ def best_over_shifts(scores: Float32Array, max_shift: int) -> tuple[Float32Array
 
 
 def shifted_queries(query: Float32Array, shape: tuple[int, ...], max_shift: int) -> Float32Array:
-    """Copies of a mean-free query (D,), moved sideways by -``max_shift`` to ``max_shift`` columns and brought to unit length.
+    """Copies (2 max_shift + 1, D) of a mean-free query (D,) as the vehicle would see it with a slightly different heading.
 
-    Columns that a shift opens up are filled with zeros, which is the mean. Returns (2 max_shift + 1, D).
+    The copies are moved sideways by -``max_shift`` to ``max_shift`` columns and normalised to unit length, so that their products
+    with unit templates are cosines. Columns that a shift opens up are filled with zeros, which is the mean.
     """
     image, columns = query.reshape(shape), shape[0]
     moved = np.zeros((2 * max_shift + 1, *shape), dtype=np.float32)

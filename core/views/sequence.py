@@ -47,7 +47,7 @@ class SequenceConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """Filtered evidence for each cell after one view."""
+    """Filtered evidence for each cell after view t."""
 
     filtered: Float32Array  # (C,) F_t
     z_score: Float32Array  # (C,) z_t
@@ -105,7 +105,10 @@ def filter_step(
 def _propagate_along(
     links: Links, before: Float32Array, z: Float32Array, driven: Step, tolerance: Step, memory: np.float32
 ) -> tuple[Float32Array, IntArray]:
-    """F_t (C,) of all cells of a graph, and the predecessor (C,) that each took its evidence from, -1 where there was none."""
+    """The compiled part of ``filter_step``: the evidence F_t (C,) of all cells, and their predecessors (C,), -1: none.
+
+    For each cell the paths that lead to it are looked for in the graph, as the graph grows with every view.
+    """
     filtered, predecessor = np.empty(len(z), dtype=np.float32), np.full(len(z), -1, dtype=np.int32)
     walk = empty_walk()
     for j in range(len(z)):
@@ -124,10 +127,10 @@ def propagate(
     tolerance: Step,
     memory: np.float32,
 ) -> Float32Array:
-    """F_t (C,) on a map whose paths were laid out beforehand.
+    """Evidence F_t (C,) on a finished map, whose paths are known beforehand; ``_evidence_at`` has the formula.
 
     Args:
-        before: F_{t-1} (C,).
+        before: evidence F_{t-1} (C,) after the view before.
         cells: cells (K,) that this view was scored against; the other cells are left without evidence.
         z: z-scores (K,) of these cells.
         predecessors: the paths that lead to each of the C cells.
@@ -146,10 +149,13 @@ def propagate(
 def _evidence_at(
     before: Float32Array, z: np.float32, paths: Paths, first: int, last: int, driven: Step, tolerance: Step, memory: np.float32
 ) -> tuple[np.float32, int]:
-    """F_t(j) = (1 - memory) z_t(j) + memory max(0, max over predecessors i of j of F_{t-1}(i)), and that predecessor or -1.
+    """Evidence of a cell j after view t, and the predecessor that it took evidence from, or -1.
 
-    The predecessors are the sources of ``paths[first:last]`` that are as long as the distance driven and turn as the vehicle
-    did. Cells beyond the end of ``before`` were added since and had no evidence. Of equal predecessors the first is taken.
+        F_t(j) = (1 - memory) z_t(j) + memory max(0, max over predecessors i of j of F_{t-1}(i))
+
+    The predecessors are the cells at which those of ``paths[first:last]`` begin that are as long as the distance driven and turn
+    as the vehicle did. Cells beyond the end of ``before`` were added since and have no evidence. Of equal predecessors the first
+    is taken.
     """
     best, predecessor = np.float32(0.0), -1
     for k in range(first, last):
@@ -173,7 +179,7 @@ def peak(evidence: Evidence, links: Links, reach: float) -> Peak:
 
 
 def margin_over(filtered: Float32Array, best: int, rivals: NDArray[np.bool_]) -> float:
-    """Evidence of the cell ``best`` minus that of the best of the rivals (mask (C,)); 0 without rivals."""
+    """How far the best cell stands out: its evidence minus that of the best of the ``rivals`` (mask (C,)); 0 without rivals."""
     if not rivals.any():
         return 0.0
     return float(filtered[best] - filtered[rivals].max())

@@ -38,7 +38,7 @@ LEAST_LEFT = 0.5  # share of a variance that one motion must leave: driving back
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointEstimate:
-    """What one population of cells knows beyond its ring and tori: its place among their repetitions, the scale, covariances."""
+    """What one population of cells knows beyond its ring and tori: the unwrapped position, the scale, and cross-covariances."""
 
     position_m: FloatArray  # (2,) the position, from which its phases on the tori are unwrapped
     log_scale: float  # ln(metres per map unit of this drive)
@@ -166,10 +166,10 @@ class AttractorBelief:
         return replace(self, head=head, grid=grid, joint=(self.joint[INTEGRATOR], joint))
 
     def _injections(self, population: int, measurement: PoseMeasurement) -> _Injections:
-        """What each network must be given so that Eqs. (13)-(16) bring it to the joint update of all four quantities.
+        """The poses and reliabilities to inject so that Eqs. (13)-(16) bring each network to the joint Kalman update.
 
-        If the joint update leaves the share ``left`` of a variance and shifts the mean by ``shift``, then so does an injection at
-        ``shift / (1 - left)`` from the mean, whose reliability is that of the belief times ``1 / left - 1``.
+        If the Kalman update leaves the share ``left`` of a variance and shifts the mean by ``shift``, then so does the injection
+        of the mean plus ``shift / (1 - left)`` with ``1 / left - 1`` times the reliability of the belief.
         """
         (pose, covariance), joint = self._estimate(population), self.joint[population]
         shift, updated = kalman_update(covariance, innovation(pose, measurement), measurement)

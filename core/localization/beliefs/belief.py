@@ -71,7 +71,7 @@ class CompetingBelief(PoseBelief, Protocol):
         """The belief after a measured pose that conflicts with it: the pose becomes the challenger, and the incumbent stays."""
 
     def reinforce(self, measurement: PoseMeasurement) -> Self:
-        """The challenger after a measured pose that agrees with it; the incumbent stays."""
+        """The belief after a measured pose that agrees with the challenger, which it updates; the incumbent stays as it is."""
 
     def adopt(self) -> Self:
         """The challenger becomes the incumbent."""

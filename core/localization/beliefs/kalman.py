@@ -59,7 +59,7 @@ class KalmanBelief:
 
     @property
     def log_scale(self) -> float:
-        """ln(metres per map unit of this drive)."""
+        """The incumbent's mean of ln(metres per map unit of this drive)."""
         return float(self.incumbent.mean[3])
 
     @property

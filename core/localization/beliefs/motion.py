@@ -24,7 +24,7 @@ class Motion:
     travelled: float  # path length, in map units of this drive
     turned_rad: float
     dt_s: float
-    gyro_rad_per_sqrt_s: float = 0.0  # random walk of the heading that the signal itself shows
+    gyro_rad_per_sqrt_s: float = 0.0  # random walk of the heading as estimated from the gyro's own signal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,18 +38,18 @@ class PoseMeasurement:
 def predicted_covariance(
     covariance: FloatArray, heading_rad: float, log_scale: float, motion: Motion, noise: MotionNoise
 ) -> FloatArray:
-    """Covariance (4, 4) of the state after a motion.
+    """Covariance (4, 4) of the state after a motion: the prediction step of an extended Kalman filter.
 
     Args:
-        covariance: that of the state before (4, 4).
-        heading_rad: heading of the state before.
-        log_scale: ln(metres per map unit) of the state before.
-        motion: the motion.
-        noise: its noise.
+        covariance: covariance (4, 4) of the state before the motion.
+        heading_rad: heading of the state before the motion.
+        log_scale: ln(metres per map unit) of the state before the motion.
+        motion: the self-motion.
+        noise: the noise of the self-motion; its gyro noise is raised to what the motion itself shows.
     """
     east_m, north_m = displacement_m(heading_rad, log_scale, motion)
-    walk = max(noise.gyro_rad_per_sqrt_s, motion.gyro_rad_per_sqrt_s)
-    sq_heading = walk**2 * motion.dt_s + (noise.gyro_gain * motion.turned_rad) ** 2
+    random_walk = max(noise.gyro_rad_per_sqrt_s, motion.gyro_rad_per_sqrt_s)
+    sq_heading = random_walk**2 * motion.dt_s + (noise.gyro_gain * motion.turned_rad) ** 2
     sq_scale = noise.scale_walk_per_sqrt_m**2 * math.hypot(east_m, north_m)
     predicted: FloatArray = _predicted(covariance, east_m, north_m, noise.speed**2 / motion.dt_s, sq_heading, sq_scale)
     return predicted
@@ -59,9 +59,10 @@ def predicted_covariance(
 def _predicted(
     covariance: FloatArray, east_m: float, north_m: float, sq_speed: float, sq_heading: float, sq_scale: float
 ) -> FloatArray:
-    """J P J^T + Q. J adds to x and y the heading error times the step turned left, and the scale error times the step.
+    """J P J^T + Q, the predicted covariance (4, 4) of (x, y, heading, log scale).
 
-    Q holds the variance of the speed along the step, and those that the motion adds to heading and scale.
+    The Jacobian J turns a heading error into a position error to the left of the step, and a scale error into one along it. Q
+    holds the variance along the step, from the speed's relative variance, and those added to heading and scale.
     """
     left = covariance.copy()  # J P
     for k in range(4):
@@ -97,7 +98,7 @@ def kalman_update(covariance: FloatArray, difference: FloatArray, measurement: P
     """Kalman update by a measured pose.
 
     Args:
-        covariance: that of the state before (4, 4).
+        covariance: covariance (4, 4) of the state before the update.
         difference: the innovation (3,).
         measurement: the measured pose; only its covariance is read.
 

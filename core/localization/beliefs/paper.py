@@ -1,8 +1,8 @@
 """Mode "paper": the printed networks on one torus, to show what they do and where they fail.
 
-Nothing moves from calibration to integrator cells, reliabilities are forced to sum to E at every tick, and the torus may lock to
-a wrong repetition: see the departures named in ``core.attractors.attractor``. The scale stays that of the map, as in the paper,
-where both drives are one.
+Nothing moves from calibration to integrator cells, reliabilities are forced to sum to E at every tick, and the position on the
+torus may be wrong by whole periods: see the departures named in ``core.attractors.attractor``. The scale stays that of the map,
+as in the paper, where both drives are one.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ class Alternatives(NamedTuple):
 
 
 class _Scratch(NamedTuple):
-    """Memory that the steps share; the two tables hold -1 everywhere between steps."""
+    """Arrays that all steps use, so that no step has to allocate them; the two tables hold -1 everywhere between steps."""
 
     row_of_state: IntArray  # (N * K,) row of the hypothesis in each state, bin by bin
     index_of_lane: IntArray  # (L,) which of the hypotheses that leave the network is on each lane

@@ -47,7 +47,7 @@ SUCCESSOR = np.dtype(
     [
         ("bin", np.int32),
         ("scale_bin", np.int32),
-        ("log_likelihood", np.float64),  # of the step that leads to it, nats
+        ("log_likelihood", np.float64),  # log likelihood in nats of the step that leads to this successor
         ("heading_offset_rad", np.float64),
         ("remainder_m", np.float64),
     ],

@@ -50,7 +50,7 @@ class OffNetworkModel(NamedTuple):
 
 
 class SearchModel(NamedTuple):
-    """All that the compiled search knows apart from the drive."""
+    """All that the compiled search needs apart from the drive."""
 
     scales: FloatArray  # (K,) metres per map unit
     graph: GraphTables
@@ -79,6 +79,6 @@ class StepObservation(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def observation_of_step(drive: Drive, t: int) -> StepObservation:
-    """What is known of the step from sample ``t - 1`` to ``t``."""
+    """What odometry and the place prior tell of the step from sample ``t - 1`` to ``t``."""
     heading, place = drive.heading_rad, drive.place_prior
     return StepObservation(heading[t], 0.5 * (heading[t - 1] + heading[t]), drive.step, place[t, 0], place[t, 1], place[t, 2])

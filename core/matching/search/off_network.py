@@ -86,7 +86,7 @@ def rejoin(hypothesis: Hypothesis, place: Place, observation: StepObservation, m
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _cells_around(grid: BinGrid, x_m: float, y_m: float, radius_m: float) -> tuple[int, int, int, int]:
-    """First and last column, first and last row of the cells that a circle touches; the last is below the first if none."""
+    """First and last column, first and last row of the grid's cells that a circle may touch; last < first if there are none."""
     column_0 = max(int((x_m - radius_m - grid.origin_m[0]) / grid.cell_m), 0)
     column_1 = min(int((x_m + radius_m - grid.origin_m[0]) / grid.cell_m), grid.columns - 1)
     row_0 = max(int((y_m - radius_m - grid.origin_m[1]) / grid.cell_m), 0)
@@ -182,8 +182,8 @@ def _leaving(hypotheses: Hypotheses, model: SearchModel, index_of_lane: IntArray
     """Choose the hypotheses that leave the network in this step: the best one on each lane; returns their indices.
 
     Only those at most ``spread_nats`` behind the best of all are considered. If they lie on more than ``_KNOWN_LANES`` lanes, the
-    route is too uncertain for any to leave. ``index_of_lane`` (L,) is scratch memory: -1 everywhere before and after, in between the
-    place of the lane's best hypothesis in the answer.
+    route is too uncertain for any to leave. ``index_of_lane`` (L,) is scratch memory: -1 everywhere before and after, and in
+    between the index, within the answer, of each lane's best hypothesis.
     """
     lane, best = model.graph.lane, hypotheses[index_of_best(hypotheses)].score_nats
     found, count = np.empty(_KNOWN_LANES, np.int64), 0

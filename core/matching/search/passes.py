@@ -44,7 +44,18 @@ class _Section(NamedTuple):
 def forward_pass(
     drive: Drive, model: SearchModel, initial: InitialHypotheses, beam_nats: float, most: int, enough: int = 0
 ) -> Survivors:
-    """One beam search, ended early once no more than ``enough`` survivors are left or there is no room for more."""
+    """Beam search over a drive, or over as much of it as fits into memory.
+
+    The search ends early once at most ``enough`` hypotheses survive a step, or once ``_MAX_ROWS`` have survived all steps.
+
+    Args:
+        drive: the drive.
+        model: lane graph, scales and costs.
+        initial: hypotheses at the first sample.
+        beam_nats: a hypothesis this far behind the best one of its step is dropped.
+        most: about how many hypotheses may survive a step.
+        enough: the search may end once no more than these survive a step; with 0 it goes on as long as any do.
+    """
     limits = BeamLimits(beam_nats, most, enough, max(_MAX_ROWS, 4 * len(initial.hypotheses)))
     survivors: Survivors = forward(drive, model, limits, *initial)
     return survivors
@@ -175,7 +186,7 @@ def _joined_alternatives(before: Alternatives, after: Alternatives) -> Alternati
 
 
 def _cells(problem: SearchProblem) -> IntArray:
-    """Cell (N,) of each bin: every lane is cut into cells of about ``_CELL_M``."""
+    """Number (N,) of the cell that each bin belongs to: every lane is cut into cells of about ``_CELL_M``."""
     graph = problem.graph
     start = graph.lane_start[graph.lane]
     cells: IntArray = start + (np.arange(graph.bin_count, dtype=np.int32) - start) // max(round(_CELL_M / problem.bin_m), 1)

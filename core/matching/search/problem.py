@@ -1,4 +1,4 @@
-"""What the route search runs on: the drive, the lane graph and the scales, and the same as the compiled search takes them."""
+"""The input of the route search: the drive, the lane graph and the scales, and all of them in the form for compiled functions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hippodrome.core.types import FloatArray, Visits
 
 
 class InitialHypotheses(NamedTuple):
-    """Hypotheses that a search begins with, and the places of those off the network."""
+    """Hypotheses that a search begins with, and the places of the hypotheses off the network."""
 
     hypotheses: Hypotheses
     places: Places
@@ -55,19 +55,19 @@ def search_problem(visits: Visits, network: RoadNetwork, config: RouteSearchConf
 
 
 def compiled_drive(problem: SearchProblem, heading_rad: FloatArray, place_prior: FloatArray | None = None) -> Drive:
-    """The drive as the compiled search takes it.
+    """The drive in the form for the compiled search.
 
     Args:
-        problem: tells the length of a step.
-        heading_rad: (T,) by odometry: those of the problem's track, or a part of them, perhaps backwards.
-        place_prior: (T, 3) x, y and 1/sigma^2 of what is known of the place at each sample.
+        problem: has the length of a step.
+        heading_rad: (T,) headings by odometry: those of the problem's track, or a part of them, perhaps in reverse order.
+        place_prior: (T, 3) x, y and 1/sigma^2 of the place at each sample, as far as it is known; None: nothing is known.
     """
     nothing_known = np.zeros((len(heading_rad), 3))
     return Drive(np.ascontiguousarray(heading_rad), nothing_known if place_prior is None else place_prior, problem.track.step)
 
 
 def compiled_model(problem: SearchProblem) -> SearchModel:
-    """Lane graph, scales and costs as the compiled search takes them."""
+    """Lane graph, scales and costs as named tuples, which is the form that compiled functions can take."""
     graph, costs, off = problem.graph, problem.costs, problem.off_network
     return SearchModel(
         scales=np.exp(problem.log_scale),

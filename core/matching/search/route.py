@@ -90,7 +90,7 @@ def best_route(
         problem: the drive, the lane graph, the scales and the costs.
         initial: hypotheses to begin with.
         config: bounds of the search.
-        place_prior: (T, 3) x, y and 1/sigma^2 of what is known of the place at each sample of the track.
+        place_prior: (T, 3) x, y and 1/sigma^2 of the place at each sample of the track, as far as it is known.
 
     Raises:
         HippodromeError: no route of the network is as long as the drive.
@@ -105,7 +105,7 @@ def best_route(
 
 
 def _route(problem: SearchProblem, traced: TracedRoute) -> Route:
-    """The traced hypotheses in terms of lanes and positions on them."""
+    """The traced route in terms of lanes and arc lengths on them instead of bins of the lane graph."""
     graph, hypotheses = problem.graph, traced.hypotheses
     on_network, bin_ = hypotheses["bin"] >= 0, np.maximum(hypotheses["bin"], 0)
     lane = graph.lane[bin_]

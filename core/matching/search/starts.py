@@ -1,8 +1,8 @@
-"""Initial hypotheses of the route search: near a prior pose, or from nothing at all.
+"""Initial hypotheses of the route search: near a prior pose, or anywhere in the network if nothing is known.
 
-From nothing, hypotheses everywhere, in coarse bins, are searched over a short part of the drive that begins at an anchor, a
-sample that much turning follows. Those that explain it are turned into fine bins and traced backwards in time, from the anchor to
-the drive's beginning.
+If nothing is known, a coarse search begins in all bins at an *anchor*, a sample of the drive that much turning follows, as turns
+tell roads apart. It goes over a short part of the drive only. The hypotheses that explain this part are refined to fine bins and
+traced backwards in time, from the anchor to the drive's beginning.
 """
 
 from __future__ import annotations
@@ -33,9 +33,10 @@ _NO_PLACES = np.empty(0, PLACE)
 
 
 def anchor_samples(track: Track, most: int) -> list[int]:
-    """Up to ``most`` samples to begin the search at, at least a horizon apart: those that most turning follows.
+    """Up to ``most`` samples at which to begin the search for an unknown start, the best one first.
 
-    Turns soon after the sample count more than late ones.
+    The vehicle turns much after them, so that few places in the network fit. Turns count less the later they come, and not at all
+    after ``_HORIZON`` steps. Chosen samples are at least ``_HORIZON`` steps apart.
     """
     turning = np.minimum(np.abs(np.diff(track.heading_rad, append=track.heading_rad[-1])), _MOST_TURN_RAD)
     weight = 1.0 - np.arange(_HORIZON) / _HORIZON

@@ -7,6 +7,7 @@ import math
 import re
 import tempfile
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Final, Literal
@@ -16,7 +17,7 @@ from pydantic import Field
 
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
-from hippodrome.sim.map_import import import_map, import_recipe, is_foreign
+from hippodrome.sim.map_import import sumo_network
 from hippodrome.sim.network import SumoNet, check_network, is_left_hand, load_net, road_network
 from hippodrome.sim.rural import rural_plan
 from hippodrome.sim.spec import Spec
@@ -54,7 +55,9 @@ class TownSpec(Spec):
 def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
     """The town of a scenario. What is generated lies below ``work_dir``, named by its content's recipe, and is made once."""
     if spec.network is not None:
-        return read_town(_imported(spec.network, work_dir))
+        net_file, notes = sumo_network(spec.network, work_dir)
+        town = read_town(net_file)
+        return replace(town, notes=(*notes, *town.notes))
     recipe = f"{spec.model_dump_json()} {rng_seed} {CONVERT_OPTIONS} {CROSSING_RADIUS_M} {THROUGH_RADIUS_M}"
     net_file = work_dir / f"{spec.kind}-{hashlib.sha256(recipe.encode()).hexdigest()[:12]}.net.xml"
     if not net_file.exists():
@@ -166,16 +169,6 @@ def _shape_text(points_m: FloatArray) -> str:
 def _strip_comments(file: Path) -> None:
     text = file.read_text(encoding="utf-8")
     file.write_text(re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL), encoding="utf-8")
-
-
-def _imported(source: Path, work_dir: Path) -> Path:
-    """A SUMO network as it is; maps of other makers imported once into ``work_dir``."""
-    if not is_foreign(source.name):
-        return source
-    net_file = work_dir / f"{source.name.partition('.')[0]}-{import_recipe(source)}.net.xml.gz"
-    if not net_file.exists():
-        import_map(source, net_file)
-    return net_file
 
 
 def _junction_polygons(net: SumoNet) -> tuple[FloatArray, ...]:

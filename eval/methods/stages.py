@@ -143,6 +143,10 @@ def refine_files(
     config = replace(_settings(scenario).refine, mode=mode)
     roads = read_roads(network, out.parent)
     refinement, cpu_s = timed(refine, cognitive_map, roads, config, start)
+    if not np.isfinite(refinement.cognitive_map.poses).all():
+        raise HippodromeError(
+            f"{source}: {len(cognitive_map.t_s)} vertices are too few to be laid on roads; drive farther, some 100 m and a corner"
+        )
     save_map(out, refinement.cognitive_map, {**provenance, "network": network.name, "refine": repr(config)})
     for stretch in refinement.breaks:
         print(f"vertices {stretch.first_vertex}-{stretch.last_vertex}: {stretch.status.name.lower()}: {stretch.cause}")

@@ -61,6 +61,10 @@ STYLE: Final = """
 .frames { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 20rem), 1fr)); gap: 1rem; }
 .frames figure { margin: 0; } .frames img { width: 100%; height: auto; display: block; border-radius: 6px; }
 .words td { white-space: normal; text-align: left; min-width: 8rem; } .words th { text-align: left; }
+@media (max-width: 40rem) {
+  .words thead { display: none; } .words tr { display: block; padding: 0.4rem 0; border-bottom: 1px solid var(--line); }
+  .words :is(th, td) { display: block; border: 0; padding: 0.1rem 0.62rem; }
+}
 .notes { color: var(--soft); font-size: 0.9rem; overflow-wrap: anywhere; }
 """
 
@@ -90,9 +94,10 @@ def drive_page(drive: Drive) -> str:
         element("title", f"{drive.name} on {drive.network}"),
         element("style", Html(style)),
     )
+    tone = None if (_status(drive) == MatchStatus.MATCHED).any() else "bad"
     body = element(
         "body",
-        element("header", element("h1", f"{drive.name} on {drive.network}"), element("p", _summary(drive))),
+        element("header", element("h1", f"{drive.name} on {drive.network}"), element("p", _summary(drive), class_=tone)),
         _tiles(drive),
         element("h2", "The map"),
         *_map(drive),
@@ -132,9 +137,9 @@ def _tiles(drive: Drive) -> Html:
         ("stretches to look at", str(len(drive.breaks)), "in the table below"),
     ]
     found = [(numbers, definition) for numbers, definition in map(_parted, drive.scores) if definition]
-    for numbers, definition in found[:2]:
-        name = definition.split(",")[0].split("(")[0].strip()[:40]
-        tiles.append((name, numbers.split(",")[0].removeprefix("mean "), "in the mean"))
+    for numbers, definition in found[:2] if good else []:  # an error of a map that nothing vouches for is no headline
+        name, *how = definition.split(";")
+        tiles.append((f"{name.split(',')[0]}, mean", numbers.split(",")[0].removeprefix("mean "), ";".join(how[:2]).strip()))
     shown = [(element("span", a), element("strong", b), element("small", c)) for a, b, c in tiles]
     return element("div", [element("div", *parts, class_="figure-tile") for parts in shown], class_="tiles")
 

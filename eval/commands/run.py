@@ -8,7 +8,7 @@ from typing import Any
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.commands.arguments import DONE, add_command, start_pose
-from hippodrome.eval.commands.exchange import IMPORTS, add_drive_options, import_command
+from hippodrome.eval.commands.exchange import IMPORTS, add_drive_options, add_exchange_commands, import_command
 
 
 def add_drive_command(commands: Any) -> None:
@@ -27,6 +27,8 @@ def add_drive_command(commands: Any) -> None:
     parser.add_argument(
         "drive", type=Path, metavar="DRIVE", help="what was recorded: as for `hippodrome import`, or a recording's folder"
     )
+    parser.conflict_handler = "resolve"  # --network means more here than to an import
+    add_drive_options(parser, layout_required=False)
     parser.add_argument(
         "--network", type=Path, required=True, metavar="MAP",
         help="the road network: SUMO (.net.xml), OpenStreetMap (.osm, .pbf) or OpenDRIVE (.xodr), also packed",
@@ -36,7 +38,6 @@ def add_drive_command(commands: Any) -> None:
         help="pose at the start of the drive, in the network's frame: metres, metres, degrees counter-clockwise from east "
              "(default: unknown, it is searched for)",
     )  # fmt: skip
-    add_drive_options(parser, layout_required=False)
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="folder for the results; what is finished in it is not made again"
     )
@@ -50,10 +51,29 @@ def _run(options: argparse.Namespace) -> int:
     if options.kind is None and not is_recording:
         raise HippodromeError(f"{options.drive}: not a recording; say what it is with --from: {', '.join(IMPORTS)}")
 
-    def import_to(recording: Path) -> None:
-        import_command(argparse.Namespace(**{**vars(options), "source": options.drive, "out": recording}))
+    def import_to(recording: Path, net_file: Path) -> None:
+        wanted = {"source": options.drive, "out": recording, "network": net_file}
+        import_command(argparse.Namespace(**{**vars(options), **wanted}))
 
     outside = {"command", "drive", "network", "out"}  # what is not an option of the results
     asked = {f"--{name.replace('_', '-')}": str(value) for name, value in vars(options).items() if name not in outside}
-    run_drive(RunOptions(options.drive, options.network, options.out, options.start, None if is_recording else import_to, asked))
+    run_drive(
+        RunOptions(
+            drive=options.drive,
+            network=options.network,
+            out=options.out,
+            start=options.start,
+            import_to=None if is_recording else import_to,
+            score=_score,
+            asked=asked,
+        )
+    )
     return DONE
+
+
+def _score(topometric: Path, recording: Path) -> None:
+    """``hippodrome score`` as it is without options."""
+    parser = argparse.ArgumentParser()
+    add_exchange_commands(parser.add_subparsers())
+    options = parser.parse_args(["score", str(topometric), str(recording)])
+    options.command(options)

@@ -9,7 +9,6 @@ from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.exported import truth_of
 from hippodrome.eval.files.trajectories import read_tum
 from hippodrome.eval.methods.materials import RPE_DELTA_M
-from hippodrome.eval.methods.stages import refused_as_a_whole
 from hippodrome.eval.metrics.alignment import AlignmentName
 from hippodrome.eval.metrics.trajectory import Score, ape, rpe
 from hippodrome.proto.codec import load_map
@@ -48,8 +47,6 @@ def _estimate(path: Path, network_frame: bool) -> tuple[Trajectory, bool]:
     """The trajectory and whether it is metric, in the network's frame."""
     if path.suffix == ".pbstream":
         found = load_map(path)[0]
-        if (warning := refused_as_a_whole(found)) is not None:
-            print(f"{path}: {warning}")
         return Trajectory(found.t_s, found.poses), found.frame == "network"
     return read_tum(path), network_frame
 

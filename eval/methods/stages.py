@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
-from typing import Final, ParamSpec, Protocol, TypeVar
+from typing import ParamSpec, Protocol, TypeVar
 
 import numpy as np
 
@@ -19,11 +19,9 @@ from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.refinement.refine import refine
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import (
-    CognitiveMap,
     FloatArray,
     HippodromeError,
     LocalizationEstimate,
-    MatchStatus,
     Observation,
     Refinement,
     StartPose,
@@ -32,19 +30,13 @@ from hippodrome.core.types import (
 from hippodrome.eval.files.scenarios import located
 from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.eval.methods.method import RefineMode
+from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.map_import import sumo_network
 from hippodrome.sim.network import junction_gaps, read_network
 from hippodrome.sim.recording import open_recording
 from hippodrome.sim.scenario import Scenario, load_scenario
 
-WHOLE_CURE: Final = "drive farther and round corners, check that the map has these roads, or give --start"
-_WORDS: Final = {
-    MatchStatus.MATCHED: "matched",
-    MatchStatus.AMBIGUOUS: "ambiguous",
-    MatchStatus.OFF_NETWORK: "off the network",
-    MatchStatus.NO_ROUTE: "without a route",
-}
 MapT_co = TypeVar("MapT_co", covariant=True)
 ResultT = TypeVar("ResultT")
 ArgumentsP = ParamSpec("ArgumentsP")
@@ -152,39 +144,37 @@ def refine_files(
         print(f"vertices {stretch.first_vertex}-{stretch.last_vertex}: {stretch.status.name.lower()}: {stretch.cause}")
     print(f"{out}: {len(cognitive_map.t_s)} vertices refined in {cpu_s:.1f} s of CPU; "
           + ", ".join(f"{name} {value:.3g}" for name, value in refinement.estimates.items()))  # fmt: skip
-    if (warning := refused_as_a_whole(refinement.cognitive_map)) is not None:
+    if (warning := refusal_note(refinement.cognitive_map)) is not None:
         print(f"{out}: {warning}")
     return refinement
 
 
 def read_roads(network: Path, folder: Path) -> RoadNetwork:
-    """The lanes of a road network of any kind; what there is to know about it is printed.
+    """The lanes of a road network of any kind; what there is to know about it is printed. As ``network_file``, and its errors."""
+    net_file = network_file(network, folder)
+    roads = read_network(net_file)
+    for note in junction_gaps(roads, net_file):
+        print(f"note: {note}")
+    return roads
+
+
+def network_file(network: Path, folder: Path) -> Path:
+    """A road network of any kind as a SUMO network; netconvert's notes are printed.
 
     Args:
         network: A SUMO network, ``package:...`` of one that is installed, or an OpenStreetMap or OpenDRIVE map.
         folder: Where the network that is made of such a map is kept, to be made once.
 
     Raises:
-        HippodromeError: The network cannot be read, or the map cannot be converted.
+        HippodromeError: There is no such file, or the map cannot be converted.
     """
     source = located(network, "--network")
     net_file, notes = sumo_network(source, folder)
     if net_file != source:
         print(f"{source}: a map to convert; its roads are in {net_file}")
-    roads = read_network(net_file)
-    for note in (*notes, *junction_gaps(roads, net_file)):
+    for note in notes:
         print(f"note: {note}")
-    return roads
-
-
-def refused_as_a_whole(cognitive_map: CognitiveMap) -> str | None:
-    """A sentence that says so if no road vouches for any vertex of a topometric map, else None."""
-    match = cognitive_map.road_match
-    if match is None or (match.status == MatchStatus.MATCHED).any():
-        return None
-    statuses, counts = np.unique(match.status, return_counts=True)
-    found = ", ".join(f"{count} {_WORDS[MatchStatus(status)]}" for status, count in zip(statuses, counts, strict=True))
-    return f"nothing of this map is vouched for: of {len(match.status)} vertices {found}; {WHOLE_CURE}"
+    return net_file
 
 
 def localize_files(source: Path, recording: Path, network: Path | None, scenario: Path | None, out: Path) -> None:
@@ -198,7 +188,7 @@ def localize_files(source: Path, recording: Path, network: Path | None, scenario
         out: The poses that the localizer declared, as TUM. Not written if it never declared one.
     """
     cognitive_map, _ = load_map(source)
-    if (warning := refused_as_a_whole(cognitive_map)) is not None:
+    if (warning := refusal_note(cognitive_map)) is not None:
         print(f"{source}: {warning}")
     if cognitive_map.frame != "network":
         raise HippodromeError(f"{source}: a semi-metric map has no metric frame to localize in; run `hippodrome refine` first")

@@ -16,7 +16,7 @@ import numpy as np
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, MatchBreak, MatchStatus, Trajectory, UInt8Array
 from hippodrome.eval.exchange.drives.exported import truth_of
-from hippodrome.eval.methods.stages import refused_as_a_whole
+from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.eval.metrics.alignment import apply_to_positions, find_alignment
 from hippodrome.eval.metrics.association import associate
 from hippodrome.eval.report.markup import Html, element, joined
@@ -119,7 +119,7 @@ def _status(drive: Drive) -> UInt8Array:
 
 
 def _summary(drive: Drive) -> str:
-    if (warning := refused_as_a_whole(drive.cognitive_map)) is not None:
+    if (warning := refusal_note(drive.cognitive_map)) is not None:
         return warning[0].upper() + warning[1:] + "."
     return (
         "Green is where roads vouch for the map: there it is metric, in the frame of the road network. The rest has a pose, "

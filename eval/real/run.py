@@ -11,15 +11,15 @@ from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TextIO
+from typing import Any, Final, TextIO, TypeVar
 
 import numpy as np
 
 from hippodrome._files import sha256_of, write_atomically
 from hippodrome.core.types import CognitiveMap, HippodromeError, MatchBreak, MatchStatus, Refinement, StartPose
 from hippodrome.eval.exchange.drives.exported import truth_of
-from hippodrome.eval.exchange.score import score_files
-from hippodrome.eval.methods.stages import map_files, read_roads, refine_files, refused_as_a_whole
+from hippodrome.eval.methods.refusal import refusal_note
+from hippodrome.eval.methods.stages import map_files, network_file, read_roads, refine_files
 from hippodrome.eval.real.page import Drive, drive_page
 from hippodrome.proto.codec import load_map
 from hippodrome.sim.recording import MANIFEST, open_recording
@@ -30,6 +30,7 @@ SEMI_METRIC: Final = "semi.pbstream"
 TOPOMETRIC: Final = "topo.pbstream"
 REFINEMENT: Final = "refinement.json"
 PAGE: Final = "drive.html"
+ResultT = TypeVar("ResultT")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,8 @@ class RunOptions:
     network: Path  # SUMO, OpenStreetMap or OpenDRIVE
     out: Path
     start: StartPose | None
-    import_to: Callable[[Path], object] | None  # writes the recording of ``drive`` to the path given; None: it is one
+    import_to: Callable[[Path, Path], object] | None  # (recording to be made, SUMO network); None: ``drive`` is a recording
+    score: Callable[[Path, Path], object]  # prints the errors of a map against a recording's truth
     asked: Mapping[str, str]
 
 
@@ -99,16 +101,18 @@ def run_drive(options: RunOptions) -> None:
     out = options.out
     asked = {**options.asked, "MAP": _content(options.network), "DRIVE": _content(options.drive)}
     _check_same(out, asked)
-    stages = _Stages(out, asked, 4 + (options.import_to is not None), {})
+    stages = _Stages(out, asked, 5 + (options.import_to is not None), {})
+    stages.run("roads", None, lambda: read_roads(options.network, out))
+    net_file = _silently(lambda: network_file(options.network, out))
     recording = options.drive
     if options.import_to is not None:
         recording, write = out / RECORDING, options.import_to
-        stages.run("import", recording / MANIFEST, lambda: write(recording))
+        stages.run("import", recording / MANIFEST, lambda: write(recording, net_file))
     semi_metric, topometric = out / SEMI_METRIC, out / TOPOMETRIC
     stages.run("map", semi_metric, lambda: map_files(recording, None, semi_metric))
-    stages.run("refine", out / REFINEMENT, lambda: _refine(options, semi_metric, topometric))
-    stages.run("score", None, lambda: _score(topometric, recording))
-    stages.run("page", None, lambda: _write_page(options, recording, stages))
+    stages.run("refine", out / REFINEMENT, lambda: _refine(options, net_file, topometric))
+    stages.run("score", None, lambda: _score(options, topometric, recording))
+    stages.run("page", None, lambda: _write_page(options, recording, net_file, stages))
     cognitive_map = load_map(topometric)[0]
     print(_verdict(cognitive_map, _read_breaks(out)))
     print(f"open {out / PAGE}")
@@ -157,8 +161,14 @@ def _overheard(work: Callable[[], object]) -> list[str]:
     return tee.kept.getvalue().splitlines()
 
 
-def _refine(options: RunOptions, semi_metric: Path, topometric: Path) -> None:
-    refinement: Refinement = refine_files(semi_metric, options.network, "route", options.start, None, topometric)
+def _silently(work: Callable[[], ResultT]) -> ResultT:
+    """What ``work`` returns, without the lines that it prints: an earlier stage said them."""
+    with redirect_stdout(io.StringIO()):
+        return work()
+
+
+def _refine(options: RunOptions, net_file: Path, topometric: Path) -> None:
+    refinement: Refinement = refine_files(options.out / SEMI_METRIC, net_file, "route", options.start, None, topometric)
     breaks = [
         {"first": one.first_vertex, "last": one.last_vertex, "status": one.status.name, "cause": one.cause}
         for one in refinement.breaks
@@ -173,30 +183,27 @@ def _read_breaks(out: Path) -> tuple[MatchBreak, ...]:
     return tuple(MatchBreak(first, last, status, cause) for first, last, status, cause in found)
 
 
-def _score(topometric: Path, recording: Path) -> None:
+def _score(options: RunOptions, topometric: Path, recording: Path) -> None:
     """The scores, where there is a truth; a map that cannot be scored is none that cannot be used."""
     try:
         if truth_of(open_recording(recording, verify=False)) is None:
             print("not scored: the drive came without truth")
             return
-        score_files(topometric, recording, network_frame=True)
+        options.score(topometric, recording)
     except HippodromeError as error:
         print(f"not scored: {error}")
 
 
-def _write_page(options: RunOptions, recording: Path, stages: _Stages) -> None:
-    said = io.StringIO()
-    with redirect_stdout(said):  # the refinement has told the notes already
-        roads = read_roads(options.network, options.out)
+def _write_page(options: RunOptions, recording: Path, net_file: Path, stages: _Stages) -> None:
     drive = Drive(
         name=options.drive.name,
         network=options.network.name,
         recording=open_recording(recording, verify=False),
         cognitive_map=load_map(options.out / TOPOMETRIC)[0],
-        roads=roads,
+        roads=_silently(lambda: read_roads(net_file, options.out)),
         breaks=_read_breaks(options.out),
         scores=tuple(stages.said("score")),
-        notes=tuple(line for name in ("import", "refine") if name in stages.done for line in stages.said(name)),
+        notes=tuple(line for name in ("roads", "import", "refine") if name in stages.done for line in stages.said(name)),
         stages={name: one["seconds"] for name, one in stages.done.items()},
     )
     write_atomically(options.out / PAGE, drive_page(drive).encode())
@@ -204,7 +211,7 @@ def _write_page(options: RunOptions, recording: Path, stages: _Stages) -> None:
 
 def _verdict(cognitive_map: CognitiveMap, breaks: tuple[MatchBreak, ...]) -> str:
     """The last line but one: how much of the map may be trusted."""
-    if (warning := refused_as_a_whole(cognitive_map)) is not None:
+    if (warning := refusal_note(cognitive_map)) is not None:
         return warning
     match = cognitive_map.road_match
     total = len(cognitive_map.t_s)

@@ -53,12 +53,9 @@ def add_exchange_commands(commands: Any) -> None:
     _add_score(commands)
 
 
-def add_drive_options(into: argparse.ArgumentParser, layout_required: bool = True) -> None:
+def add_drive_options(into: argparse.ArgumentParser) -> None:
     """How a drive that was recorded elsewhere is taken in: of `import`, and of what imports by itself."""
-    into.add_argument(
-        "--from", required=layout_required, choices=IMPORTS, dest="kind",
-        help="the layout of the source" + ("" if layout_required else " (default: it is a recording already)"),
-    )  # fmt: skip
+    into.add_argument("--from", required=True, choices=IMPORTS, dest="kind", help="the layout of the source")
     into.add_argument(
         "--odometry", metavar="FILE",
         help="the self-motion: a .csv of t_s,speed,yaw_rate (seconds, any unit of length a second, radians a second), a .tum of "

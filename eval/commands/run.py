@@ -27,8 +27,11 @@ def add_drive_command(commands: Any) -> None:
     parser.add_argument(
         "drive", type=Path, metavar="DRIVE", help="what was recorded: as for `hippodrome import`, or a recording's folder"
     )
-    parser.conflict_handler = "resolve"  # --network means more here than to an import
-    add_drive_options(parser, layout_required=False)
+    parser.conflict_handler = "resolve"  # --from and --network mean more here than to an import
+    add_drive_options(parser)
+    parser.add_argument(
+        "--from", choices=IMPORTS, dest="kind", help="the layout of the drive (default: it is a recording already)"
+    )
     parser.add_argument(
         "--network", type=Path, required=True, metavar="MAP",
         help="the road network: SUMO (.net.xml), OpenStreetMap (.osm, .pbf) or OpenDRIVE (.xodr), also packed",

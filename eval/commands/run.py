@@ -23,12 +23,12 @@ def add_drive_command(commands: Any) -> None:
         last lines; the exit status is 0 then too.""",
         ["hippodrome run kitti/sequences/09 --network karlsruhe.osm --from kitti --odometry truth --out out/kitti-09",
          "hippodrome run recordings/monday --network town.net.xml --out out/monday"],
+        later_wins=True,
     )  # fmt: skip
     parser.add_argument(
         "drive", type=Path, metavar="DRIVE", help="what was recorded: as for `hippodrome import`, or a recording's folder"
     )
-    parser.conflict_handler = "resolve"  # --from and --network mean more here than to an import
-    add_drive_options(parser)
+    add_drive_options(parser)  # of these, --from and --network mean more here
     parser.add_argument(
         "--from", choices=IMPORTS, dest="kind", help="the layout of the drive (default: it is a recording already)"
     )

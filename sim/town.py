@@ -15,6 +15,7 @@ from typing import Final, Literal
 import numpy as np
 from pydantic import Field
 
+from hippodrome._files import replacing
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
 from hippodrome.sim.map_import import sumo_network
@@ -132,14 +133,14 @@ def _read_plain(nodes_file: Path, edges_file: Path) -> Plan:
 
 def _write_plan_as_net(plan: Plan, spec: TownSpec, net_file: Path) -> None:
     """netconvert's network of a plan, atomically, and without its comments, which hold the date."""
-    net_file.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=net_file.parent) as folder:
+    with tempfile.TemporaryDirectory() as folder:  # not beside the result: to netconvert a comma in a path separates two files
         nodes, edges, net = (Path(folder) / name for name in ("town.nod.xml", "town.edg.xml", "town.net.xml"))
         nodes.write_text(_nodes_xml(plan), encoding="utf-8")
         edges.write_text(_edges_xml(plan, spec), encoding="utf-8")
         run_tool("netconvert", f"--node-files={nodes}", f"--edge-files={edges}", f"--output-file={net}", *CONVERT_OPTIONS)
         _strip_comments(net)
-        net.replace(net_file)
+        with replacing(net_file) as temporary:
+            temporary.write_bytes(net.read_bytes())
 
 
 def _nodes_xml(plan: Plan) -> str:

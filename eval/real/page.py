@@ -53,7 +53,7 @@ STYLE: Final = """
 .drive-map .truth { fill: none; stroke: var(--truth); }
 .drive-map .line { fill: none; stroke-linecap: round; stroke-linejoin: round; }
 .drive-map text { fill: var(--ink); paint-order: stroke; stroke: var(--paper);
-  font-family: system-ui, sans-serif; font-weight: 600; }
+  font-family: system-ui, sans-serif; font-weight: 600; font-size: calc(15 * var(--pixel)); }
 .legend { display: flex; flex-wrap: wrap; gap: 0.3rem 1.2rem; font-size: 0.88rem; color: var(--soft);
   padding: 0; list-style: none; }
 .legend span { display: inline-block; width: 1.4rem; height: 0.3rem; border-radius: 2px; vertical-align: middle;
@@ -62,6 +62,7 @@ STYLE: Final = """
 .frames figure { margin: 0; } .frames img { width: 100%; height: auto; display: block; border-radius: 6px; }
 .words td { white-space: normal; text-align: left; min-width: 8rem; } .words th { text-align: left; }
 @media (max-width: 40rem) {
+  .drive-map text { font-size: calc(34 * var(--pixel)); }
   .words thead { display: none; } .words tr { display: block; padding: 0.4rem 0; border-bottom: 1px solid var(--line); }
   .words :is(th, td) { display: block; border: 0; padding: 0.1rem 0.62rem; }
 }
@@ -167,8 +168,9 @@ def _map(drive: Drive) -> Iterable[Html]:
         parts.append(_mark(place, poses[(one.first_vertex + one.last_vertex) // 2, :2], str(number), COLOURS[one.status], pixel))
     parts.append(_mark(place, poses[0, :2], "start", "var(--ink)", pixel))
     name = f"map of {drive.name} over the roads of {drive.network}"
+    size = f'viewBox="0 0 {width} {height}" style="--pixel: {pixel:.2f}px"'
     yield Html(
-        f'<svg class="drive-map" viewBox="0 0 {width} {height}" role="img" aria-label="{html.escape(name)}">{joined(parts)}'
+        f'<svg class="drive-map" {size} role="img" aria-label="{html.escape(name)}">{joined(parts)}'
         f"{_scale_bar(width, height, pixel)}</svg>"
     )
     kinds = [kind for kind in MatchStatus if (status == kind).any()]
@@ -228,7 +230,7 @@ def _mark(place: _Place, point_m: FloatArray, text: str, colour: str, pixel: flo
 
 
 def _label(x: float, y: float, text: str, pixel: float) -> str:
-    return f'<text x="{x:.0f}" y="{y:.0f}" font-size="{15 * pixel:.0f}" stroke-width="{3 * pixel:.1f}">{html.escape(text)}</text>'
+    return f'<text x="{x:.0f}" y="{y:.0f}" stroke-width="{3 * pixel:.1f}">{html.escape(text)}</text>'
 
 
 def _scale_bar(width: int, height: int, pixel: float) -> Html:

@@ -12,6 +12,7 @@ from hippodrome.eval.commands.arguments import BAD_INPUT, INTERRUPTED, Command, 
 from hippodrome.eval.commands.authoring import add_scenario_command
 from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands
+from hippodrome.eval.commands.run import add_drive_command
 from hippodrome.eval.commands.runs import add_run_commands
 from hippodrome.eval.commands.stages import add_stage_commands
 from hippodrome.eval.commands.sweep import add_sweep_command
@@ -64,6 +65,7 @@ def make_parser() -> argparse.ArgumentParser:
     add_run_commands(commands)
     add_scenario_command(commands)
     add_gate_commands(commands)
+    add_drive_command(commands)
     add_stage_commands(commands)
     add_trial_commands(commands)
     add_sweep_command(commands)

@@ -8,7 +8,8 @@ import zlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final, TypeAlias
-from xml.sax import SAXException
+from xml.parsers import expat
+from xml.sax import SAXException, parse
 
 import numpy as np
 import sumolib
@@ -26,6 +27,9 @@ MIN_LANE_M: Final = 0.01  # SUMO writes coordinates in centimetres; a shorter la
 MAX_CHAIN: Final = 6  # internal lanes in a row; netconvert makes up to three
 HELD_PHASE_S: Final = 150.0  # no driver waits that long: such a traffic light is meant to be switched by hand
 COINCIDENT_M: Final = 1.0  # nodes closer than this are one crossing to a driver
+SUMO_TRUE: Final = {"true", "1", "yes", "on", "x", "t"}  # what SUMO reads as true, in any case of letters
+PIECE_BYTES: Final = 1 << 14
+MAX_HEAD_BYTES: Final = 64 << 20  # of comments before the root element
 
 
 def read_network(net_file: Path | str) -> RoadNetwork:
@@ -48,12 +52,26 @@ def load_net(net_file: Path) -> SumoNet:
     """``sumolib``'s network, internal lanes included; every way of being unreadable is one ``HippodromeError``."""
     _reject_foreign(net_file)
     try:
-        return sumolib.net.readNet(str(net_file), withInternal=True, withFoes=False, withPrograms=True, lxml=False)
+        with gzip.open(net_file) if _is_packed(net_file) else net_file.open("rb") as stream:
+            reader = _NetReader(withInternal=True, withFoes=False, withPrograms=True, withMacroConnectors=True)
+            parse(stream, reader)
+        net = reader.getNet()
+        net.initRoutingCache(1000)  # as sumolib.net.readNet does
+        return net
     except (SAXException, OSError, EOFError, zlib.error) as error:
         raise HippodromeError(f"{net_file}: broken network ({_one_line(error)}); write it again with netconvert") from error
     except (KeyError, AttributeError, ValueError, TypeError, IndexError) as error:
         reason = f"{type(error).__name__} {_one_line(error)}"
         raise HippodromeError(f"{net_file}: not a consistent SUMO network ({reason}); write it again with netconvert") from error
+
+
+class _NetReader(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has no types
+    """sumolib's reader, which takes the offset of a traffic light for a number; SUMO also knows ``begin``. We use none."""
+
+    def startElement(self, name: str, attrs: Any) -> None:
+        if name == "tlLogic" and attrs.get("offset") == "begin":
+            attrs = {**dict(attrs.items()), "offset": "0"}
+        super().startElement(name, attrs)
 
 
 def road_network(net: SumoNet, net_file: Path) -> RoadNetwork:
@@ -85,9 +103,9 @@ def road_network(net: SumoNet, net_file: Path) -> RoadNetwork:
 
 
 def is_left_hand(net_file: Path) -> bool:
-    """Driving side, from the ``<net lefthand=...>`` attribute, which sumolib does not keep."""
-    tag = _head(net_file).partition("<net ")[2].partition(">")[0]
-    return 'lefthand="true"' in tag or 'lefthand="1"' in tag
+    """Driving side, from the ``<net lefthand=...>`` attribute, which sumolib does not keep; read as SUMO reads booleans."""
+    _, attributes = _root(net_file)
+    return attributes.get("lefthand", "").lower() in SUMO_TRUE
 
 
 def drivable_edges(network: RoadNetwork) -> IntArray:
@@ -146,7 +164,19 @@ def check_network(net: SumoNet, network: RoadNetwork, net_file: Path) -> tuple[s
     drivable = drivable_edges(network)
     if len(drivable) == 0:
         raise HippodromeError(f"{net_file}: no closed loop for passenger cars, so no tour can return; add a way round or U-turns")
-    return (*_disconnected(network, drivable), *_zero_length(network), *_coincident(net), *_held_signals(net))
+    gaps = junction_gaps(network, net_file)
+    return (*gaps, *_disconnected(network, drivable), *_zero_length(network), *_coincident(net), *_held_signals(net))
+
+
+def junction_gaps(network: RoadNetwork, net_file: Path) -> tuple[str, ...]:
+    """A note if the network has roads that follow one another but no lanes inside of its junctions, else nothing."""
+    if network.is_internal.any() or len(network.successor) == 0:
+        return ()
+    name = net_file.name
+    return (
+        f"{name} has no lanes inside junctions, so drives jump over them and maps are refused; write it again with "
+        f"netconvert --no-internal-links=false -s {name} -o NEW.net.xml",
+    )
 
 
 def _disconnected(network: RoadNetwork, drivable: IntArray) -> Iterable[str]:
@@ -197,7 +227,7 @@ def _parts(count: int, source: IntArray, target: IntArray, connection: str) -> I
 
 
 def _car_lanes(net: SumoNet) -> list[SumoLane]:
-    edges = [edge for edge in net.getEdges() if edge.getFunction() in ("", "internal")]
+    edges = [edge for edge in net.getEdges() if edge.getFunction() in ("", "connector", "internal")]
     return [lane for edge in edges for lane in edge.getLanes() if lane.allows("passenger")]
 
 
@@ -261,24 +291,37 @@ def _starts(groups: Iterable[FloatArray | list[int]]) -> IntArray:
 def _reject_foreign(net_file: Path) -> None:
     if not net_file.is_file():
         raise HippodromeError(f"{net_file}: no such network file; give a SUMO .net.xml or .net.xml.gz")
-    head = _head(net_file)
-    if "<net " in head or "<net>" in head:
+    tag, _ = _root(net_file)
+    if tag == "net":
         return
-    if "<osm" in head or "<OpenDRIVE" in head:
-        raise HippodromeError(f"{net_file}: not a SUMO network but a map to convert; run netconvert on it first")
+    if tag in ("osm", "OpenDRIVE"):
+        kind = ".osm" if tag == "osm" else ".xodr"
+        raise HippodromeError(f"{net_file}: not a SUMO network but a map to convert; name it {kind} and netconvert is run")
     raise HippodromeError(f"{net_file}: not a SUMO network (no <net> element); give a .net.xml or .net.xml.gz")
 
 
-def _head(net_file: Path) -> str:
-    """The file's first 64 KiB: the netconvert settings comment and the root element."""
+def _root(net_file: Path) -> tuple[str, dict[str, str]]:
+    """Name and attributes of the root element, however long the comments before it; an empty name where there is none."""
+    found: list[tuple[str, dict[str, str]]] = []
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = lambda name, attributes: found.append((name, attributes))
     try:
-        raw = net_file.open("rb").read(1 << 16)
-        if raw[:2] == b"\x1f\x8b":
-            with gzip.open(net_file) as packed:
-                raw = packed.read(1 << 16)
+        with gzip.open(net_file) if _is_packed(net_file) else net_file.open("rb") as stream:
+            for _ in range(MAX_HEAD_BYTES // PIECE_BYTES):
+                piece = stream.read(PIECE_BYTES)
+                parser.Parse(piece, not piece)
+                if found or not piece:
+                    break
+    except expat.ExpatError:
+        pass  # the root may stand before what is broken, and else there is none
     except (OSError, EOFError, zlib.error) as error:
         raise HippodromeError(f"{net_file}: unreadable ({_one_line(error)}); check the file") from error
-    return raw.decode("utf-8", errors="replace")
+    return found[0] if found else ("", {})
+
+
+def _is_packed(net_file: Path) -> bool:
+    with net_file.open("rb") as stream:
+        return stream.read(2) == b"\x1f\x8b"
 
 
 def _one_line(error: BaseException) -> str:

@@ -33,7 +33,7 @@ def sumo_run(net_file: Path, vehicle_types: str, seed: int) -> Iterator[None]:
         types_file = Path(folder) / "types.add.xml"
         types_file.write_text(vehicle_types, encoding="utf-8")
         options = (
-            f"--net-file={net_file}",
+            f"--net-file={_without_comma(net_file, Path(folder))}",
             f"--additional-files={types_file}",
             f"--seed={seed % 2**31}",
             f"--step-length={SUMO_STEP_S}",
@@ -55,6 +55,15 @@ def sumo_run(net_file: Path, vehicle_types: str, seed: int) -> Iterator[None]:
             raise HippodromeError(f"{net_file}: SUMO failed: {' '.join(str(error).split())}") from error
         finally:
             libsumo.close()
+
+
+def _without_comma(net_file: Path, folder: Path) -> Path:
+    """The network by a name that SUMO does not take for several files: a link in ``folder`` if there is a comma in its path."""
+    if "," not in str(net_file):
+        return net_file
+    link = folder / f"town{'.net.xml.gz' if net_file.suffix == '.gz' else '.net.xml'}"
+    link.symlink_to(net_file.resolve())
+    return link
 
 
 def _let_signals_run() -> None:

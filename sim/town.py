@@ -7,6 +7,7 @@ import math
 import re
 import tempfile
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Final, Literal
@@ -14,9 +15,10 @@ from typing import Final, Literal
 import numpy as np
 from pydantic import Field
 
+from hippodrome._files import replacing
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
-from hippodrome.sim.map_import import import_map, import_recipe, is_foreign
+from hippodrome.sim.map_import import sumo_network
 from hippodrome.sim.network import SumoNet, check_network, is_left_hand, load_net, road_network
 from hippodrome.sim.rural import rural_plan
 from hippodrome.sim.spec import Spec
@@ -54,7 +56,9 @@ class TownSpec(Spec):
 def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
     """The town of a scenario. What is generated lies below ``work_dir``, named by its content's recipe, and is made once."""
     if spec.network is not None:
-        return read_town(_imported(spec.network, work_dir))
+        net_file, notes = sumo_network(spec.network, work_dir)
+        town = read_town(net_file)
+        return replace(town, notes=(*notes, *town.notes))
     recipe = f"{spec.model_dump_json()} {rng_seed} {CONVERT_OPTIONS} {CROSSING_RADIUS_M} {THROUGH_RADIUS_M}"
     net_file = work_dir / f"{spec.kind}-{hashlib.sha256(recipe.encode()).hexdigest()[:12]}.net.xml"
     if not net_file.exists():
@@ -129,14 +133,14 @@ def _read_plain(nodes_file: Path, edges_file: Path) -> Plan:
 
 def _write_plan_as_net(plan: Plan, spec: TownSpec, net_file: Path) -> None:
     """netconvert's network of a plan, atomically, and without its comments, which hold the date."""
-    net_file.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=net_file.parent) as folder:
+    with tempfile.TemporaryDirectory() as folder:  # not beside the result: to netconvert a comma in a path separates two files
         nodes, edges, net = (Path(folder) / name for name in ("town.nod.xml", "town.edg.xml", "town.net.xml"))
         nodes.write_text(_nodes_xml(plan), encoding="utf-8")
         edges.write_text(_edges_xml(plan, spec), encoding="utf-8")
         run_tool("netconvert", f"--node-files={nodes}", f"--edge-files={edges}", f"--output-file={net}", *CONVERT_OPTIONS)
         _strip_comments(net)
-        net.replace(net_file)
+        with replacing(net_file) as temporary:
+            temporary.write_bytes(net.read_bytes())
 
 
 def _nodes_xml(plan: Plan) -> str:
@@ -166,16 +170,6 @@ def _shape_text(points_m: FloatArray) -> str:
 def _strip_comments(file: Path) -> None:
     text = file.read_text(encoding="utf-8")
     file.write_text(re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL), encoding="utf-8")
-
-
-def _imported(source: Path, work_dir: Path) -> Path:
-    """A SUMO network as it is; maps of other makers imported once into ``work_dir``."""
-    if not is_foreign(source.name):
-        return source
-    net_file = work_dir / f"{source.name.partition('.')[0]}-{import_recipe(source)}.net.xml.gz"
-    if not net_file.exists():
-        import_map(source, net_file)
-    return net_file
 
 
 def _junction_polygons(net: SumoNet) -> tuple[FloatArray, ...]:

@@ -86,8 +86,7 @@ def new_scenario(name: str, source: str, path: Path) -> Draft:
             raise HippodromeError(f"{target}: exists already; choose another --out, or remove it first")
     with tempfile.TemporaryDirectory() as folder:
         imported = Path(folder) / network.name if network else None
-        if imported:
-            import_map(Path(source), imported)
+        imported_notes = import_map(Path(source), imported) if imported else ()
         town = _town(source, imported, Path(folder))
         draft = draft_for(town)
         text = scenario_text(name, source, path, draft)
@@ -97,7 +96,7 @@ def new_scenario(name: str, source: str, path: Path) -> Draft:
         if network and imported:
             write_atomically(network, imported.read_bytes())
     write_atomically(path, text.encode())
-    return replace(draft, notes=network_notes(scenario, town))
+    return replace(draft, notes=(*imported_notes, *network_notes(scenario, town)))
 
 
 def draft_for(town: Town) -> Draft:

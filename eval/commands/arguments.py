@@ -27,7 +27,7 @@ class HelpLayout(argparse.HelpFormatter):
 
 
 def add_command(
-    commands: Any, name: str, run: Command, summary: str, description: str, examples: Sequence[str]
+    commands: Any, name: str, run: Command, summary: str, description: str, examples: Sequence[str], *, later_wins: bool = False
 ) -> argparse.ArgumentParser:
     """Add a command to a parser's sub-parsers.
 
@@ -38,8 +38,9 @@ def add_command(
         summary: A few words for the list of commands.
         description: What it does, what goes in and what comes out, in paragraphs.
         examples: Command lines that work.
+        later_wins: Whether an option may be added once more, in place of the one before: options shared with another command.
     """
-    parser = _add_parser(commands, name, summary, description, examples)
+    parser = _add_parser(commands, name, summary, description, examples, "resolve" if later_wins else "error")
     parser.set_defaults(command=run)
     return parser
 
@@ -51,10 +52,17 @@ def add_group(commands: Any, name: str, summary: str, description: str, examples
     return parser.add_subparsers(metavar="ACTION", title="actions")
 
 
-def _add_parser(commands: Any, name: str, summary: str, description: str, examples: Sequence[str]) -> argparse.ArgumentParser:
+def _add_parser(
+    commands: Any, name: str, summary: str, description: str, examples: Sequence[str], conflict_handler: str = "error"
+) -> argparse.ArgumentParser:
     epilog = "\n  ".join(["examples:" if len(examples) > 1 else "example:", *examples])
     parser: argparse.ArgumentParser = commands.add_parser(
-        name, help=summary, description=inspect.cleandoc(description), epilog=epilog, formatter_class=HelpLayout
+        name,
+        help=summary,
+        description=inspect.cleandoc(description),
+        epilog=epilog,
+        formatter_class=HelpLayout,
+        conflict_handler=conflict_handler,
     )
     return parser
 

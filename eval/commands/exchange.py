@@ -38,7 +38,7 @@ def add_exchange_commands(commands: Any) -> None:
     out.add_argument("--out", type=Path, required=True, metavar="DIR", help="a new folder; one that exists is not touched")
 
     into = add_command(
-        commands, "import", _import, "make a recording of a drive that somebody else recorded",
+        commands, "import", import_command, "make a recording of a drive that somebody else recorded",
         """Make a recording of a drive that somebody else recorded: frames, self-motion and, where it is known, truth.
 
         `hippodrome map`, `refine`, `localize`, `score` and `export` take the recording like one of ours. Frames and self-motion
@@ -48,6 +48,13 @@ def add_exchange_commands(commands: Any) -> None:
          "hippodrome import kitti/sequences/07 --from kitti --odometry truth --size 160x48 --out recordings/kitti-07"],
     )  # fmt: skip
     into.add_argument("source", type=Path, metavar="SOURCE", help="the sequence's folder, an .mcap file, or a ROS 1 or ROS 2 bag")
+    add_drive_options(into)
+    into.add_argument("--out", type=Path, required=True, metavar="RECORDING", help="a new folder; one that exists is not touched")
+    _add_score(commands)
+
+
+def add_drive_options(into: argparse.ArgumentParser) -> None:
+    """How a drive that was recorded elsewhere is taken in: of `import`, and of what imports by itself."""
     into.add_argument("--from", required=True, choices=IMPORTS, dest="kind", help="the layout of the source")
     into.add_argument(
         "--odometry", metavar="FILE",
@@ -67,8 +74,9 @@ def add_exchange_commands(commands: Any) -> None:
              "aligned first (default: own)",
     )  # fmt: skip
     into.add_argument("--size", type=_size, metavar="WxH", help="scale frames to this size in pixels (default: as they are)")
-    into.add_argument("--out", type=Path, required=True, metavar="RECORDING", help="a new folder; one that exists is not touched")
 
+
+def _add_score(commands: Any) -> None:
     score = add_command(
         commands, "score", _score, "score a map or a trajectory against a recording's truth",
         """Print the absolute and relative errors (APE, RPE; metres) of a map or a trajectory, each with its definition.
@@ -105,7 +113,8 @@ def _export(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _import(options: argparse.Namespace) -> int:
+def import_command(options: argparse.Namespace) -> int:
+    """``hippodrome import``, with the options of ``add_drive_options``, ``source`` and ``out``."""
     from hippodrome.eval.exchange.importing import ImportOptions, import_drive
 
     axes: Literal["body", "camera"] = options.axes or ("camera" if options.kind == "kitti" else "body")

@@ -36,8 +36,10 @@ def add_stage_commands(commands: Any) -> None:
     )  # fmt: skip
     refine.add_argument("map", type=Path, metavar="MAP.pbstream", help="the semi-metric map, of `hippodrome map`")
     refine.add_argument(
-        "--network", type=Path, required=True, metavar="NET.net.xml[.gz]", help="the road network, in SUMO's format"
-    )
+        "--network", type=Path, required=True, metavar="MAP",
+        help="the road network: SUMO (.net.xml), OpenStreetMap (.osm, .pbf) or OpenDRIVE (.xodr), also packed. Others than SUMO "
+             "are converted once and kept beside the output",
+    )  # fmt: skip
     refine.add_argument(
         "--mode", type=refine_mode, choices=["route", "paper"], default="route",
         help="route: search the route over the whole network, the start may be unknown; paper: the published equations (8)-(12), "
@@ -65,8 +67,8 @@ def add_stage_commands(commands: Any) -> None:
         "recording", type=Path, metavar="RECORDING", help="a recording's folder, made by `hippodrome render` or `import`"
     )
     localize.add_argument(
-        "--network", type=Path, metavar="NET.net.xml[.gz]",
-        help="the road network, whose lanes the estimate is drawn to (default: localize by the map alone)",
+        "--network", type=Path, metavar="MAP",
+        help="the road network, as for refine, whose lanes the estimate is drawn to (default: localize by the map alone)",
     )  # fmt: skip
     _add_settings(localize, "localizer")
     localize.add_argument("--out", type=Path, required=True, metavar="TRAJECTORY.tum", help="file for the trajectory")

@@ -17,12 +17,23 @@ from hippodrome.core import se2
 from hippodrome.core.localization.localizer import Localizer
 from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.refinement.refine import refine
-from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, Observation, StartPose, Trajectory
+from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.types import (
+    FloatArray,
+    HippodromeError,
+    LocalizationEstimate,
+    Observation,
+    Refinement,
+    StartPose,
+    Trajectory,
+)
 from hippodrome.eval.files.scenarios import located
 from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.eval.methods.method import RefineMode
+from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.proto.codec import load_map, save_map
-from hippodrome.sim.network import read_network
+from hippodrome.sim.map_import import sumo_network
+from hippodrome.sim.network import junction_gaps, read_network
 from hippodrome.sim.recording import open_recording
 from hippodrome.sim.scenario import Scenario, load_scenario
 
@@ -107,12 +118,12 @@ def map_files(recording: Path, scenario: Path | None, out: Path) -> None:
 
 def refine_files(
     source: Path, network: Path, mode: RefineMode, start: StartPose | None, scenario: Path | None, out: Path
-) -> None:
+) -> Refinement:
     """``hippodrome refine``: refine a semi-metric map with a road network. Raises HippodromeError on bad input.
 
     Args:
         source: The semi-metric map.
-        network: A SUMO network, or ``package:...`` of one that is installed.
+        network: A SUMO network, ``package:...`` of one that is installed, or a map that is converted and kept beside ``out``.
         mode: Mode of the refinement.
         start: Where the mapping drive began; mode ``paper`` needs it.
         scenario: Where the refinement's settings are from; None takes the defaults.
@@ -122,12 +133,48 @@ def refine_files(
         raise HippodromeError("mode 'paper' begins at a known pose: give --start X,Y,HEADING, or use --mode route")
     cognitive_map, provenance = load_map(source)
     config = replace(_settings(scenario).refine, mode=mode)
-    refinement, cpu_s = timed(refine, cognitive_map, read_network(located(network, "--network")), config, start)
+    roads = read_roads(network, out.parent)
+    refinement, cpu_s = timed(refine, cognitive_map, roads, config, start)
+    if not np.isfinite(refinement.cognitive_map.poses).all():
+        raise HippodromeError(
+            f"{source}: {len(cognitive_map.t_s)} vertices are too few to be laid on roads; drive farther, some 100 m and a corner"
+        )
     save_map(out, refinement.cognitive_map, {**provenance, "network": network.name, "refine": repr(config)})
     for stretch in refinement.breaks:
         print(f"vertices {stretch.first_vertex}-{stretch.last_vertex}: {stretch.status.name.lower()}: {stretch.cause}")
     print(f"{out}: {len(cognitive_map.t_s)} vertices refined in {cpu_s:.1f} s of CPU; "
           + ", ".join(f"{name} {value:.3g}" for name, value in refinement.estimates.items()))  # fmt: skip
+    if (warning := refusal_note(refinement.cognitive_map)) is not None:
+        print(f"{out}: {warning}")
+    return refinement
+
+
+def read_roads(network: Path, folder: Path) -> RoadNetwork:
+    """The lanes of a road network of any kind; what there is to know about it is printed. As ``network_file``, and its errors."""
+    net_file = network_file(network, folder)
+    roads = read_network(net_file)
+    for note in junction_gaps(roads, net_file):
+        print(f"note: {note}")
+    return roads
+
+
+def network_file(network: Path, folder: Path) -> Path:
+    """A road network of any kind as a SUMO network; netconvert's notes are printed.
+
+    Args:
+        network: A SUMO network, ``package:...`` of one that is installed, or an OpenStreetMap or OpenDRIVE map.
+        folder: Where the network that is made of such a map is kept, to be made once.
+
+    Raises:
+        HippodromeError: There is no such file, or the map cannot be converted.
+    """
+    source = located(network, "--network")
+    net_file, notes = sumo_network(source, folder)
+    if net_file != source:
+        print(f"{source}: a map to convert; its roads are in {net_file}")
+    for note in notes:
+        print(f"note: {note}")
+    return net_file
 
 
 def localize_files(source: Path, recording: Path, network: Path | None, scenario: Path | None, out: Path) -> None:
@@ -136,15 +183,17 @@ def localize_files(source: Path, recording: Path, network: Path | None, scenario
     Args:
         source: The topometric map.
         recording: The drive to localize.
-        network: A SUMO network whose lanes the estimate is pulled to; None does without.
+        network: The road network, as for ``refine_files``, to whose lanes the estimate is pulled; None does without.
         scenario: Where the localizer's settings are from; None takes the defaults.
         out: The poses that the localizer declared, as TUM. Not written if it never declared one.
     """
     cognitive_map, _ = load_map(source)
+    if (warning := refusal_note(cognitive_map)) is not None:
+        print(f"{source}: {warning}")
     if cognitive_map.frame != "network":
         raise HippodromeError(f"{source}: a semi-metric map has no metric frame to localize in; run `hippodrome refine` first")
     drive = open_recording(recording)
-    roads = read_network(located(network, "--network")) if network else None
+    roads = read_roads(network, out.parent) if network else None
     run = localize_recording(drive.observations(), Localizer(cognitive_map, roads, _settings(scenario).localizer))
     declared = run.declared()
     if declared is not None:

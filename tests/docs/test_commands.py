@@ -26,6 +26,7 @@ EXPENSIVE = {  # parsed only; what runs them instead
     "stress": "half a minute a case; tests/eval/trials/stress runs its parts",
     "robustness": "minutes; tests/eval/trials/robustness runs its parts",
     "baselines": "most of an hour; tests/eval/trials/rivals and tests/eval/rivals run short drives",
+    "run": "a drive and a map; tests/eval/real runs small ones",
     "gate": "an evaluation a seed; tests/eval/gate judges stored results. `gate --power` is run",
 }
 VALUES = {"N": "1", "MIN": "5", "WxH": "64x48", "FORMAT": "tum"}  # of placeholders that are no files

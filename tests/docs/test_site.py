@@ -48,7 +48,7 @@ def test_every_page_is_in_the_navigation():
 
     Loader.add_multi_constructor("tag:yaml.org,2002:python/", lambda loader, suffix, node: None)
     text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-    named = set(re.findall(r"[\w/]+\.md", str(yaml.load(text, Loader)["nav"])))
+    named = set(re.findall(r"[\w/-]+\.md", str(yaml.load(text, Loader)["nav"])))
     assert {page.path.name for page in documents() if page.path.parent.name == "docs"} <= named
 
 

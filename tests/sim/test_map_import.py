@@ -2,6 +2,7 @@
 
 import gzip
 
+import numpy as np
 import pytest
 
 from hippodrome.core.types import HippodromeError
@@ -9,7 +10,8 @@ from hippodrome.eval.authoring.check import check_scenario
 from hippodrome.eval.authoring.draft import draft_for, new_scenario
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.sim import map_import
-from hippodrome.sim.map_import import import_map
+from hippodrome.sim.map_import import import_map, sumo_network
+from hippodrome.sim.network import read_network
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.town import TownSpec, build_town, read_town
 
@@ -111,3 +113,79 @@ def test_new_overwrites_no_network(tmp_path):
     with pytest.raises(HippodromeError, match=r"b\.net\.xml\.gz: exists already"):
         new_scenario("b", str(source), tmp_path / "b.yaml")
     assert not (tmp_path / "b.yaml").exists()
+
+
+@pytest.mark.parametrize("name", ["osm_bbox.osm.xml.gz", "BLOCK.OSM", "Block.Osm.Gz"])
+def test_a_map_is_known_by_its_ending_in_any_case_of_letters(tmp_path, name):
+    source = tmp_path / name
+    source.write_bytes(gzip.compress(BLOCK.encode()) if name.lower().endswith("gz") else BLOCK.encode())
+    net_file, _ = sumo_network(source, tmp_path / "made")
+    assert read_network(net_file).lane_count > 0
+
+
+def test_a_map_is_converted_once_and_told_by_its_content(tmp_path):
+    source = packed_block(tmp_path, ".osm")
+    first, _ = sumo_network(source, tmp_path / "made")
+    first.write_bytes(b"marked")
+    assert sumo_network(source, tmp_path / "made")[0].read_bytes() == b"marked"
+    source.write_text(BLOCK.replace("residential", "primary"))
+    assert sumo_network(source, tmp_path / "made")[0] != first
+    assert sumo_network(first, tmp_path / "made") == (first, ())
+
+
+def test_a_single_road_is_kept_and_said_to_join_no_other(tmp_path):
+    """netconvert takes away roads without a junction, so nothing was left and "no lane is open to cars" was said."""
+    source = tmp_path / "road.osm"
+    source.write_text(BLOCK.replace(REFS, '<nd ref="1"/><nd ref="2"/>'))
+    net_file, notes = sumo_network(source, tmp_path)
+    assert read_network(net_file).lane_count >= 2
+    assert any("no road of it joins another one" in note for note in notes)
+    assert sumo_network(source, tmp_path)[1] == notes  # also when it was converted before
+
+
+def test_a_map_without_roads_for_cars_says_that(tmp_path):
+    source = tmp_path / "yard.osm"
+    source.write_text(BLOCK.replace("residential", "service"))
+    with pytest.raises(HippodromeError, match=r"yard\.osm: holds no roads for cars .*service roads.*larger extract"):
+        import_map(source, tmp_path / "yard.net.xml.gz")
+
+
+def test_what_netconvert_warns_of_is_told_once_for_each_kind(tmp_path):
+    source = tmp_path / "bent.osm"
+    lost = "".join(
+        f'<way id="{i}" version="1"><nd ref="1"/><nd ref="99"/><tag k="highway" v="residential"/></way>' for i in (7, 8)
+    )
+    source.write_text(BLOCK.replace("</osm>", f"{lost}</osm>"))
+    notes = import_map(source, tmp_path / "bent.net.xml.gz")
+    assert any(note.startswith("netconvert: ") for note in notes) and len(notes) <= 6
+    assert any("of this kind)" in note for note in notes)
+
+
+OVAL = """<OpenDRIVE><header revMajor="1" revMinor="4"/><road name="oval" length="365.663706" id="1" junction="-1">
+<link><predecessor elementType="road" elementId="1" contactPoint="end"/>
+<successor elementType="road" elementId="1" contactPoint="start"/></link><planView>
+<geometry s="0" x="0" y="0" hdg="0" length="120"><line/></geometry>
+<geometry s="120" x="120" y="0" hdg="0" length="62.831853"><spiral curvStart="0.05" curvEnd="{end}"/></geometry>
+<geometry s="182.831853" x="120" y="40" hdg="3.141593" length="120"><line/></geometry>
+<geometry s="302.831853" x="0" y="40" hdg="3.141593" length="62.831853">
+<spiral curvStart="0.05" curvEnd="{end}"></spiral></geometry>
+</planView><lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right><lane id="-1" type="driving">
+<link><predecessor id="-1"/><successor id="-1"/></link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right>
+</laneSection></lanes></road></OpenDRIVE>"""
+
+
+@pytest.mark.parametrize("end", ["0.05", "0.05000000000000001"])
+def test_a_spiral_that_is_an_arc_is_read_as_one(tmp_path, end):
+    """netconvert makes a straight of the one and runs out of memory on the other; the half circles have a radius of 20 m."""
+    source = tmp_path / "oval.xodr"
+    source.write_text(OVAL.format(end=end))
+    net_file, notes = sumo_network(source, tmp_path)
+    points = read_network(net_file).points_m
+    assert "2 spiral(s) of constant curvature" in notes[0]
+    assert np.ptp(points, axis=0) == pytest.approx([120 + 2 * 21.75, 2 * 21.75], abs=1.0)  # the lane lies 1.75 m to the right
+
+
+def test_a_spiral_that_is_one_goes_to_netconvert_as_it_is(tmp_path):
+    source = tmp_path / "map.xodr"
+    source.write_text(OVAL.format(end="0.06"))
+    assert map_import._with_arcs_for_arcs(source) == 0 and source.read_text() == OVAL.format(end="0.06")

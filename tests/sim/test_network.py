@@ -1,4 +1,5 @@
 import gzip
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from hippodrome.sim.network import (
     edge_lengths_m,
     edge_links,
     is_left_hand,
+    junction_gaps,
     junction_lengths_m,
     load_net,
     read_network,
@@ -170,3 +172,47 @@ def test_real_networks_join_up(name):
     }
     found = {(network.edge_ids[a], network.edge_ids[b]) for a, b in zip(*edge_links(network), strict=True)}
     assert found == expected
+
+
+@pytest.mark.parametrize(
+    "root", ['<net\n  version="1.20"', "<!-- " + 9000 * "an option of netconvert " + '--><net version="1.20"']
+)
+def test_the_root_is_found_wherever_xml_allows_it(tmp_path, root):
+    file = tmp_path / "town.net.xml"
+    file.write_text(PLAIN.replace('<net version="1.20"', root))
+    assert read_network(file).lane_count == read_network(_written(tmp_path, PLAIN)).lane_count
+    assert not is_left_hand(file)
+
+
+@pytest.mark.parametrize(("value", "left"), [
+    ("true", True), ("True", True), ("YES", True), ("on", True), ("x", True), ("T", True), ("1", True),
+    ("false", False), ("0", False), ("no", False), ("", False),
+])  # fmt: skip
+def test_the_driving_side_is_read_as_sumo_reads_booleans(tmp_path, value, left):
+    assert is_left_hand(_written(tmp_path, TINY.format(lefthand=f' lefthand="{value}"'))) == left
+
+
+def test_a_traffic_light_that_begins_its_cycle_at_the_start_is_read(tmp_path):
+    light = '<tlLogic id="B" type="static" programID="0" offset="begin"><phase duration="30" state="GG"/></tlLogic></net>'
+    assert read_network(_written(tmp_path, PLAIN.replace("</net>", light))).lane_count > 0
+
+
+def test_a_connector_is_a_road(tmp_path):
+    text = PLAIN.replace('<edge id="b" from', '<edge id="b" function="connector" from')
+    assert read_network(_written(tmp_path, text)).edge_ids == read_network(_written(tmp_path, PLAIN)).edge_ids
+
+
+def test_a_network_without_lanes_inside_junctions_names_the_cure(tmp_path):
+    text = re.sub(r"<edge id=.:.*?</edge>\n|<connection from=.:.*?/>\n| via=.[^ ]*", "", PLAIN)
+    file = _written(tmp_path, text)
+    (note,) = junction_gaps(read_network(file), file)
+    assert "netconvert --no-internal-links=false -s written.net.xml" in note
+    assert note in check_network(load_net(file), read_network(file), file)
+    file = _written(tmp_path, PLAIN)
+    assert junction_gaps(read_network(file), file) == ()
+
+
+def _written(folder, text):
+    file = folder / "written.net.xml"
+    file.write_text(text)
+    return file

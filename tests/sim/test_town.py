@@ -1,6 +1,7 @@
 from itertools import combinations
 from pathlib import Path
 
+import libsumo
 import numpy as np
 import pytest
 import sumo
@@ -13,6 +14,7 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.sim.generators import grid_plan, radial_plan, through_nodes
 from hippodrome.sim.network import drivable_edges, edge_lengths_m
 from hippodrome.sim.rural import MIN_RADIUS_M, rural_plan
+from hippodrome.sim.sumo_run import sumo_run
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.town import TownSpec, build_town
 
@@ -123,3 +125,12 @@ def test_tools_complaints_become_the_error(tmp_path):
 def test_bad_specs_are_rejected(bad):
     with pytest.raises(ValidationError):
         TownSpec(**bad)
+
+
+def test_a_comma_in_a_folder_separates_no_files(tmp_path):
+    """SUMO and netconvert take a comma in a path for the end of one file's name."""
+    folder = tmp_path / "towns, mine"
+    town = build_town(TownSpec(kind="grid", width_m=150, height_m=150, road_km=0.8), 1, folder)
+    assert town.net_file.parent == folder and [path.name for path in folder.iterdir()] == [town.net_file.name]
+    with sumo_run(town.net_file, "<additional/>", 1):
+        assert libsumo.edge.getIDCount() > 0

@@ -1,0 +1,161 @@
+"""One command from a drive and a map to a page: on a small drive of ours, and on a real one where it lies beside the checkout."""
+
+import gzip
+import json
+import re
+import zipfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from hippodrome.core import se2
+from hippodrome.eval.cli import main
+from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
+from tests.sim.test_map_import import BLOCK
+
+REAL = Path(__file__).parents[3].parent / "shared" / "real" / "kitti-03"
+NOTHING = "nothing vouches for this map"
+
+
+def write_drive(folder):
+    """A drive of 160 m round one corner, in the TUM layout: too short for any network to vouch for."""
+    (folder / "rgb").mkdir(parents=True)
+    rng, pose = np.random.default_rng(1), np.zeros(3)
+    odometry, truth, frames = [], [], []
+    for step in range(200):
+        t_s, yaw_rate = 0.1 * step, np.pi / 6 if 120 <= step < 150 else 0.0
+        odometry.append(f"{t_s:.1f},8.0,{yaw_rate:.6f}\n")
+        truth.append(f"{t_s:.1f} {pose[0]:.4f} {pose[1]:.4f} 0 0 0 {np.sin(pose[2] / 2):.9f} {np.cos(pose[2] / 2):.9f}\n")
+        if step % 4 == 0:
+            image = cv2.resize(rng.integers(0, 255, (8, 12, 3), np.uint8), (96, 64))
+            cv2.imwrite(str(folder / "rgb" / f"{step}.png"), image)
+            frames.append(f"{t_s:.1f} rgb/{step}.png\n")
+        pose = se2.compose(pose, np.array([0.8, 0.0, 0.1 * yaw_rate]))
+    for name, lines in (("odometry.csv", odometry), ("groundtruth.txt", truth), ("rgb.txt", frames)):
+        (folder / name).write_text("".join(lines))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """A recording that no road network can vouch for, and a map of a block of streets."""
+    folder = tmp_path_factory.mktemp("drive")
+    (folder / "block.osm").write_text(BLOCK)
+    assert main(["import", str(write_drive(folder / "tum")), "--from", "tum", "--out", str(folder / "recording")]) == DONE
+    return folder / "recording", folder / "block.osm"
+
+
+@pytest.fixture(scope="module")
+def finished(drive, tmp_path_factory):
+    out = tmp_path_factory.mktemp("finished") / "out"
+    assert main(["run", str(drive[0]), "--network", str(drive[1]), "--out", str(out)]) == DONE
+    return out
+
+
+def test_a_recording_and_an_osm_map_become_a_page(drive, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["run", str(drive[0]), "--network", str(drive[1]), "--out", str(out)]) == DONE
+    said = capsys.readouterr().out.splitlines()
+    assert said[-2].startswith(NOTHING) and "--start" in said[-2] and said[-1] == f"open {out / 'drive.html'}"
+    assert next(line for line in said if re.match(r"\d/5 \w+: [\d.]+ s", line)).startswith("1/5 roads")
+    assert {path.name.split("-")[0] for path in out.iterdir()} == {
+        "semi.pbstream", "topo.pbstream", "refinement.json", "run.json", "drive.html", "block",
+    }  # fmt: skip
+
+
+def test_the_page_needs_nothing_but_itself_and_says_what_to_do(finished):
+    page = (finished / "drive.html").read_text()
+    assert not re.search(r'(?:src|href)="(?!data:)', page) and "<script" not in page and "@import" not in page
+    assert page.count("data:image/jpeg;base64,") >= 2
+    assert NOTHING[1:] in page and "what to do next" in page and "--start" in page
+    assert page.count('class="roads"') == 1 and "APE, position" in page
+
+
+def test_what_is_done_is_not_done_again(drive, finished, capsys):
+    before = {path.name: path.stat().st_mtime_ns for path in finished.glob("*.pbstream")}
+    assert main(["run", str(drive[0]), "--network", str(drive[1]), "--out", str(finished)]) == DONE
+    said = capsys.readouterr().out
+    assert "2/5 map: done before" in said and "3/5 refine: done before" in said
+    assert before == {path.name: path.stat().st_mtime_ns for path in finished.glob("*.pbstream")}
+
+
+def test_a_run_that_was_killed_resumes(drive, finished, capsys):
+    (finished / "refinement.json").unlink()
+    assert main(["run", str(drive[0]), "--network", str(drive[1]), "--out", str(finished)]) == DONE
+    said = capsys.readouterr().out
+    assert "2/5 map: done before" in said and "3/5 refine ..." in said and (finished / "refinement.json").exists()
+
+
+def test_results_of_another_map_are_not_mixed_in(drive, finished, tmp_path, capsys):
+    other = tmp_path / "other.osm"
+    other.write_text(BLOCK.replace("residential", "primary"))
+    assert main(["run", str(drive[0]), "--network", str(other), "--out", str(finished)]) == BAD_INPUT
+    assert "was made with another MAP; choose a new --out" in capsys.readouterr().err
+    assert main(["run", str(drive[0]), "--network", str(drive[1]), "--start", "1,2,3", "--out", str(finished)]) == BAD_INPUT
+    assert "another --start" in capsys.readouterr().err
+
+
+def test_a_folder_of_other_things_is_left_alone(drive, tmp_path, capsys):
+    (tmp_path / "mine.txt").write_text("mine")
+    assert main(["run", str(drive[0]), "--network", str(drive[1]), "--out", str(tmp_path)]) == BAD_INPUT
+    assert "holds other files than a run's" in capsys.readouterr().err
+
+
+def test_what_is_no_recording_needs_its_layout(drive, tmp_path, capsys):
+    assert main(["run", str(tmp_path), "--network", str(drive[1]), "--out", str(tmp_path / "out")]) == BAD_INPUT
+    assert "say what it is with --from" in capsys.readouterr().err
+
+
+def test_a_foreign_layout_is_imported_first(drive, tmp_path, capsys):
+    named = write_drive(tmp_path / "<b>drive")
+    arguments = ["run", str(named), "--from", "tum", "--network", str(drive[1]), "--out", str(tmp_path / "out")]
+    assert main(arguments) == DONE
+    assert "2/6 import" in capsys.readouterr().out
+    assert "<b>drive" not in (tmp_path / "out" / "drive.html").read_text()
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert set(record["stages"]) == {"roads", "import", "map", "refine", "score", "page"}
+
+
+def test_refine_converts_a_map_once_and_localize_says_what_was_refused(drive, finished, tmp_path, capsys):
+    topo, semi = tmp_path / "topo.pbstream", finished / "semi.pbstream"
+    for again in (False, True):
+        out = tmp_path / "again.pbstream" if again else topo
+        assert main(["refine", str(semi), "--network", str(drive[1]), "--out", str(out)]) == DONE
+        said = capsys.readouterr().out
+        (made,) = tmp_path.glob("block-*.net.xml.gz")
+        assert f"its roads are in {made}" in said and NOTHING in said
+        made.chmod(0o444)
+    network = ["--network", str(drive[1])]
+    assert main(["localize", str(topo), str(drive[0]), *network, "--out", str(tmp_path / "drive.tum")]) == DONE
+    assert NOTHING in capsys.readouterr().out and len(list(tmp_path.glob("*.net.xml.gz"))) == 1
+
+
+def kitti_sequence(folder):
+    """KITTI 03 as its own layout has it, every second frame."""
+    sequence, number = folder / "sequences" / "03", 0
+    (sequence / "image_0").mkdir(parents=True)
+    (folder / "poses").mkdir()
+    with zipfile.ZipFile(REAL / "frames.zip") as packed:
+        names = sorted(name for name in packed.namelist() if name.endswith(".jpg"))[::2]
+        for number, name in enumerate(names):
+            image = cv2.imdecode(np.frombuffer(packed.read(name), np.uint8), cv2.IMREAD_GRAYSCALE)
+            cv2.imwrite(str(sequence / "image_0" / f"{number:06d}.png"), image)
+    rows = gzip.decompress((REAL / "03.txt.gz").read_bytes()).decode().splitlines(keepends=True)
+    (folder / "poses" / "03.txt").write_text("".join(rows[::2]))
+    (sequence / "times.txt").write_text("".join(f"{0.2 * i:.6f}\n" for i in range(number + 1)))
+    return sequence
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason=f"the real drive KITTI 03 does not lie at {REAL}")
+def test_a_real_drive_ends_with_a_page(tmp_path, capsys):
+    arguments = [
+        "run", str(kitti_sequence(tmp_path)), "--from", "kitti", "--odometry", "truth", "--size", "207x62",
+        "--network", str(REAL / "k03-own-path.osm.gz"), "--out", str(tmp_path / "out"),
+    ]  # fmt: skip
+    assert main(arguments) == DONE
+    said = capsys.readouterr().out.splitlines()
+    assert said[-2].startswith((NOTHING, "roads vouch for"))
+    page = (tmp_path / "out" / "drive.html").read_text()
+    assert page.count("data:image/jpeg") == 6 and "truth, laid on the map by one rigid fit" in page and "APE, position" in page

@@ -13,13 +13,16 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from hippodrome.core.types import FloatArray, HippodromeError
+from hippodrome.core.types import FloatArray, HippodromeError, StartPose
+from hippodrome.sim.geo_start import GeoStart
 
 if TYPE_CHECKING:
     from pyproj import Transformer
 
 NO_PROJECTION = ("", "!", "-", ".", "0")  # what SUMO writes where there is none, or one that it keeps to itself
 MAX_HEAD_BYTES = 4 << 20  # <location> is the first element of a network; comments may stand before it
+GPS_SIGMA_M = 8.0  # a fix of a phone between houses, and the error of a map beside it
+UNKNOWN_SIGMA_RAD = 10.0  # all headings are as likely: the opposite one costs 0.05 nats
 STEP_M = 1.0  # how far one goes into a compass direction to see where it points in the network
 
 
@@ -59,7 +62,8 @@ class GeoReference:
     def heading_rad(self, lat_deg: float, lon_deg: float, compass_deg: float) -> float:
         """Heading in the network, radians counter-clockwise from its x axis, of a compass direction (degrees).
 
-        A compass counts clockwise from north. North on Earth and "up" in the network differ by the projection's convergence, which is taken into account.
+        A compass counts clockwise from north. North on Earth and "up" in the network differ by the projection's convergence,
+        which is taken into account.
         """
         from pyproj import Geod
 
@@ -95,8 +99,31 @@ def read_georeference(net_file: Path) -> GeoReference:
     return reference
 
 
+def placed_start(start: StartPose | GeoStart | None, network: Path, mode: str = "route") -> StartPose | None:
+    """The start in the network's frame, whichever way it was given; None stays None.
+
+    Args:
+        start: The start as the user gave it.
+        network: The SUMO network that says where on Earth it lies; it is opened only for a start that is a place on Earth.
+        mode: Mode of the refinement; "paper" needs a heading.
+
+    Raises:
+        GeoReferenceError: The network has no projection, or a heading is missing that is needed.
+    """
+    if not isinstance(start, GeoStart):
+        return start
+    if start.compass_deg is None and mode == "paper":
+        raise GeoReferenceError("mode 'paper' begins with a known heading: give --start geo:LAT,LON,HEADING, or use --mode route")
+    reference = read_georeference(network)
+    x_m, y_m = reference.to_network(np.array([start.lat_deg]), np.array([start.lon_deg]))[0]
+    if start.compass_deg is None:
+        return StartPose(float(x_m), float(y_m), 0.0, sigma_m=GPS_SIGMA_M, sigma_rad=UNKNOWN_SIGMA_RAD)
+    heading_rad = reference.heading_rad(start.lat_deg, start.lon_deg, start.compass_deg)
+    return StartPose(float(x_m), float(y_m), heading_rad, sigma_m=GPS_SIGMA_M)
+
+
 def _location(net_file: Path) -> dict[str, str]:
-    parser = ElementTree.XMLPullParser(["start"])
+    parser: ElementTree.Any = ElementTree.XMLPullParser(["start"])
     try:
         with net_file.open("rb") as raw:
             packed = raw.read(2) == b"\x1f\x8b"
@@ -107,7 +134,8 @@ def _location(net_file: Path) -> dict[str, str]:
                 if b"<!ENTITY" in piece:
                     raise GeoReferenceError(f"{net_file}: declares entities, which no network needs; remove them")
                 parser.feed(piece)
-                for _, element in parser.read_events():
+                for event in parser.read_events():
+                    element = event[1]
                     if element.tag == "location":
                         return {str(name): str(value) for name, value in element.attrib.items()}
     except (OSError, EOFError, zlib.error) as error:

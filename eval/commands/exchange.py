@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command
 
-EXPORTS = ("tum", "kitti", "euroc", "mcap", "rerun", "evo", "rosbag2")
+EXPORTS = ("tum", "kitti", "euroc", "mcap", "rerun", "evo", "rosbag2", "gpx", "geojson")
 IMPORTS = ("tum", "kitti", "euroc", "mcap", "rosbag")
 
 
@@ -19,17 +19,23 @@ def add_exchange_commands(commands: Any) -> None:
         """Write the drives of a run, with truth, trajectories, frames, self-motion, maps and roads, in another tool's format.
 
         Writes a new folder; its about.json says which frames of reference, units and precision hold in it. MCAP, Rerun, evo and
-        ROS 2 bags need packages: pip install 'hippodrome[exchange]'.""",
+        ROS 2 bags need packages: pip install 'hippodrome[exchange]'. GPX and GeoJSON need a network that says where on Earth it
+        lies, as those made of OpenStreetMap do.""",
         ["hippodrome export out/eval --to mcap --out out/for-foxglove",
-         "hippodrome export out/grid/recordings/grid-mapping-* --to tum --out out/grid-tum"],
+         "hippodrome export out/grid/recordings/grid-mapping-* --to tum --out out/grid-tum",
+         "hippodrome export topo.pbstream --to geojson --network town.net.xml --out web"],
     )  # fmt: skip
     out.add_argument(
-        "source", type=Path, metavar="FOLDER", help="the results of a whole run, the folder of one scenario in it, or a recording"
+        "source",
+        type=Path,
+        metavar="FOLDER",
+        help="the results of a whole run, the folder of one scenario in it, or a recording; for gpx and geojson also one map "
+        "(.pbstream) or trajectory (.tum)",
     )
     out.add_argument(
         "--to", required=True, choices=EXPORTS,
         help="the format. tum, kitti, euroc: the layouts of these datasets; mcap: for Foxglove; rerun: for the Rerun viewer; "
-             "evo: results for evo_res; rosbag2: for ros2 bag",
+             "evo: results for evo_res; rosbag2: for ros2 bag; gpx, geojson: latitude and longitude, for any web map",
     )  # fmt: skip
     out.add_argument(
         "--network", type=Path, metavar="NET.net.xml[.gz]",

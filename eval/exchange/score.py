@@ -213,7 +213,7 @@ def _say_accuracy(truth: Truth, sheet: _Sheet) -> None:
         return
     sigma_m = float(np.sqrt(np.mean(known**2)))
     sheet.note(
-        f"the truth itself is uncertain by {sigma_m:.2f} m (one sigma along each axis): even a perfect estimate would have a mean "
+        f"the truth itself is uncertain by {sigma_m:.2f} m (one sigma along each axis): a perfect estimate would have a mean "
         f"APE of about {RAYLEIGH_MEAN * sigma_m:.2f} m"
     )
 

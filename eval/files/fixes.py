@@ -229,7 +229,11 @@ def _geojson(path: Path, text: str) -> Iterator[_Fix]:
         lines += 1
         about = feature.get("properties") or {}
         inner = about.get("coordinateProperties") or {} if isinstance(about, dict) else {}
-        times = (about.get("coordTimes") or about.get("times") or inner.get("times")) if isinstance(about, dict) else None
+        times = (
+            (about.get("coordTimes") or about.get("times") or inner.get("times") or about.get("t_s"))
+            if isinstance(about, dict)
+            else None
+        )
         places = geometry.get("coordinates")
         if not isinstance(times, list) or not isinstance(places, list) or len(times) != len(places):
             raise TrajectoryError(

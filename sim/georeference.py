@@ -123,7 +123,7 @@ def placed_start(start: StartPose | GeoStart | None, network: Path, mode: str = 
 
 
 def _location(net_file: Path) -> dict[str, str]:
-    parser: ElementTree.Any = ElementTree.XMLPullParser(["start"])
+    parser: Any = ElementTree.XMLPullParser(["start"])
     try:
         with net_file.open("rb") as raw:
             packed = raw.read(2) == b"\x1f\x8b"

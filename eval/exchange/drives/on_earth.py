@@ -31,7 +31,7 @@ class Place:
     epoch_s: float | None  # when the drive started, seconds since 1970; None: unknown
     status: tuple[str, ...] | None = None  # of each vertex of a map: "matched", or why no road vouches for it
     lane: tuple[str, ...] | None = None  # of each vertex of a map; "" where there is none
-    sigma_m: FloatArray | None = None  # (N,) root mean square of the position's two standard deviations
+    sigma_m: FloatArray | None = None  # (N,) root mean square of a position's two standard deviations; nan: unknown
 
     def times(self) -> list[str] | None:
         """Date and time of each place in ISO 8601; None where the date is unknown."""
@@ -104,5 +104,6 @@ def _map(name: str, found: CognitiveMap, reference: GeoReference, epoch_s: float
         status = tuple(MatchStatus(int(value)).name.lower() for value in match.status)
         lane = tuple(match.lane_ids[int(i)] if i >= 0 else "" for i in match.lane)
     if found.covariance is not None:
-        sigma_m = np.sqrt((found.covariance[:, 0, 0] + found.covariance[:, 1, 1]) / 2.0)
+        variance = (found.covariance[:, 0, 0] + found.covariance[:, 1, 1]) / 2.0
+        sigma_m = np.sqrt(np.where(variance >= 0.0, variance, np.nan))
     return Place(name, found.t_s, reference.to_lat_lon(found.poses), epoch_s, status, lane, sigma_m)

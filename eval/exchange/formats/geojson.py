@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hippodrome.eval.exchange.drives.exported import ExportedDrive
 from hippodrome.eval.exchange.drives.on_earth import Place, placed_drive
 
@@ -60,7 +62,7 @@ def _points(place: Place) -> list[dict[str, Any]]:
         about: dict[str, Any] = {"name": place.name, "vertex": i, "t_s": float(place.t_s[i]), "status": status}
         if place.lane is not None and place.lane[i]:
             about["lane"] = place.lane[i]
-        if place.sigma_m is not None:
+        if place.sigma_m is not None and np.isfinite(place.sigma_m[i]):
             about["sigma_m"] = round(float(place.sigma_m[i]), 3)
         found.append(_feature("Point", at[i], about))
     return found

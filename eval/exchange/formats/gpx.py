@@ -11,8 +11,8 @@ from hippodrome.eval.exchange.drives.on_earth import VOUCHED, Place, placed_driv
 
 CONVENTIONS = (
     "WGS84 degrees, printed to 1e-9 (0.1 mm); positions are the rear axle's; elevation is left out",
-    "one track for each trajectory and map; a map's track has a segment for each stretch that roads vouch for, and a track of its "
-    "own for those that none vouches for",
+    "one track for each trajectory and map; a map's track has a segment for each stretch that roads vouch for, and a track of "
+    "its own for those that none vouches for",
     "times only where the drive's clock counts from 1970; what has no metric frame (semi-metric, dead reckoning) is left out",
 )
 NAMESPACE = "http://www.topografix.com/GPX/1/1"

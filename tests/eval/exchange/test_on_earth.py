@@ -44,7 +44,7 @@ def test_gpx_of_a_whole_run(run, network, tmp_path):
     space = {"g": "http://www.topografix.com/GPX/1/1"}
     assert root.tag == "{http://www.topografix.com/GPX/1/1}gpx"
     tracks = {track.find("g:name", space).text: track for track in root.findall("g:trk", space)}
-    points = [(float(p.get("lon")), float(p.get("lat"))) for p in tracks["topometric"].iter("{*}trkpt")]
+    points = [(float(p.get("lon")), float(p.get("lat"))) for p in tracks["topometric"].findall(".//g:trkpt", space)]
     assert np.abs(metres(points) - read_tum(run.scenario / "topometric.tum").poses[:, :2]).max() < 1e-3
     assert "semi-metric" not in tracks
     assert "truth" in tracks
@@ -63,8 +63,9 @@ def test_geojson_says_what_vouches_for_each_vertex(run, network, tmp_path):
     assert np.abs(metres([p["geometry"]["coordinates"] for p in points]) - found.poses[:, :2]).max() < 1e-3
     lines = [f for f in features if f["geometry"]["type"] == "LineString"]
     assert [line["properties"]["status"] for line in lines] == ["matched", "no_route", "ambiguous", "matched", "off_network"]
-    sigma = np.sqrt((found.covariance[:, 0, 0] + found.covariance[:, 1, 1]) / 2.0)
-    assert np.allclose([p["properties"]["sigma_m"] for p in points], sigma, atol=1e-3)
+    variance = (found.covariance[:, 0, 0] + found.covariance[:, 1, 1]) / 2.0
+    said = [p["properties"].get("sigma_m", np.nan) for p in points]  # a random matrix is not always a covariance
+    assert np.allclose(np.square(said), np.where(variance >= 0.0, variance, np.nan), atol=1e-2, equal_nan=True)
 
 
 def test_our_geojson_is_a_truth_that_we_read(run, network, tmp_path):

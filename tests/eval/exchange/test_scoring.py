@@ -82,7 +82,7 @@ def test_sparse_truth_is_scored_at_its_own_times(run, exported, tmp_path, capsys
     fixes = Trajectory(t_s, se2.interpolate(truth.t_s, truth.poses, t_s))
     np.savetxt(tmp_path / "fixes.tum", rows(fixes), fmt="%.17g")
     imported(tmp_path / "seq", tmp_path / "in", "--truth", tmp_path / "fixes.tum", "--truth-frame", "network")
-    estimate = Trajectory(truth.t_s, truth.poses + [0.3, 0.4, 0.0])
+    estimate = Trajectory(truth.t_s, truth.poses + np.array([0.3, 0.4, 0.0]))
     np.savetxt(tmp_path / "estimate.tum", rows(estimate), fmt="%.17g")
     status, said = scored(capsys, tmp_path / "estimate.tum", tmp_path / "in", "--truth-sigma", "2")
     assert status == DONE
@@ -99,7 +99,7 @@ def test_fixes_on_earth_are_scored_in_the_networks_frame(run, exported, tmp_path
     places = GeoReference(UTM32, OFFSET, "a").to_lat_lon(truth.poses[::10])
     lines = [f"{t!r},{lat:.10f},{lon:.10f},1.5" for t, (lat, lon) in zip(truth.t_s[::10].tolist(), places, strict=True)]
     (tmp_path / "fixes.csv").write_text("t_s,lat,lon,sigma_m\n" + "\n".join(lines) + "\n")
-    write_tum(tmp_path / "estimate.tum", Trajectory(truth.t_s, truth.poses + [0.3, 0.4, 0.0]))
+    write_tum(tmp_path / "estimate.tum", Trajectory(truth.t_s, truth.poses + np.array([0.3, 0.4, 0.0])))
     options = ["--truth", tmp_path / "fixes.csv", "--network", network]
     status, said = scored(capsys, tmp_path / "estimate.tum", run.mapping.folder, *options)
     assert status == DONE

@@ -90,7 +90,7 @@ def test_axes_and_order_of_columns_are_told_by_the_motion(tmp_path):
     assert motion_in_body(read_poses(camera, "camera"))[2] > 0.99
     table = np.loadtxt(tum(tmp_path / "body.tum", lifted(truth)))
     np.savetxt(tmp_path / "wxyz.tum", table[:, [0, 1, 2, 3, 7, 4, 5, 6]], fmt="%.12f")
-    with pytest.raises(TrajectoryError, match="order qx qy qz qw|--axes"):
+    with pytest.raises(TrajectoryError, match=r"order qx qy qz qw|--axes"):
         read_poses(tmp_path / "wxyz.tum")
 
 

@@ -66,8 +66,10 @@ def read_poses(path: Path, axes: Axes | None = None, times: Path | None = None) 
     else:
         found = _tum(path, table, axes or "body", bool(lines) and lines[0].startswith(HEAD))
     found = _in_order(path, found)
-    if not found.own:
-        _check(path, found)
+    if found.own:
+        return found
+    found = _with_course(path, found)
+    _check(path, found)
     return found
 
 
@@ -180,6 +182,25 @@ def _turn_up(up: FloatArray) -> FloatArray:
 def _angle_deg(a: FloatArray, b: FloatArray) -> float:
     cosine = float(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)))
     return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _with_course(path: Path, poses: SpatialPoses) -> SpatialPoses:
+    """The poses themselves; or, where all attitudes are one that the motion contradicts, with the direction of motion as heading.
+
+    Many write positions alone as TUM, with 0 0 0 1 in the place of the attitude.
+    """
+    constant = len(poses.t_s) > 2 and float(np.ptp(poses.rotations, axis=0).max()) < 1e-9
+    if not constant or poses.axes != "body" or abs(motion_in_body(poses)[0]) > 0.99:
+        return poses
+    steps = np.gradient(poses.positions[:, :2], axis=0)
+    moving = np.flatnonzero(np.hypot(steps[:, 0], steps[:, 1]) > 0.0)
+    if len(moving) == 0:
+        return poses
+    last = moving[np.clip(np.searchsorted(moving, np.arange(len(steps)), side="right") - 1, 0, None)]
+    course = np.arctan2(steps[last, 1], steps[last, 0])
+    note = f"{path}: its attitudes never change, so headings are taken from the direction of motion"
+    return SpatialPoses(poses.t_s, poses.positions, Rotation.from_euler("z", course[:, None]).as_matrix(), "body", False,
+                        (*poses.notes, note))  # fmt: skip
 
 
 def _check(path: Path, poses: SpatialPoses) -> None:

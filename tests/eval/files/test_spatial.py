@@ -82,6 +82,15 @@ def test_a_road_that_climbs_is_not_laid_flat():
     assert np.array_equal(level(climbing), np.eye(3))
 
 
+def test_positions_alone_take_their_heading_from_the_motion(tmp_path):
+    truth = drive()
+    rest = np.tile([0.0, 0.0, 0.0, 0.0, 1.0], (len(truth.t_s), 1))
+    np.savetxt(tmp_path / "a.tum", np.column_stack([truth.t_s, truth.poses[:, :2], rest]))
+    found = read_poses(tmp_path / "a.tum")
+    assert "direction of motion" in found.notes[0]
+    assert np.abs(np.angle(np.exp(1j * (flatten(found).poses[:, 2] - truth.poses[:, 2])))).max() < 0.05
+
+
 def test_axes_and_order_of_columns_are_told_by_the_motion(tmp_path):
     truth = drive()
     camera = tum(tmp_path / "cam.tum", seen(truth, np.eye(3), CAMERA_IN_BODY))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from typing import Any
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.commands.arguments import BAD_INPUT, INTERRUPTED, Command, HelpLayout, print_help
+from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, INTERRUPTED, Command, HelpLayout, print_help
 from hippodrome.eval.commands.authoring import add_scenario_command
 from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands
@@ -47,7 +48,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     one_opencv_thread()
     try:
-        return command(options)
+        status = command(options)
+        sys.stdout.flush()  # what is still to be printed meets a closed pipe here, where it is handled, or not at all
+        return status
+    except BrokenPipeError:  # the reader of our output, `head` for one, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
     except HippodromeError as error:
         print(f"hippodrome: {error}", file=sys.stderr)
         return BAD_INPUT

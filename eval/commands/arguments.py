@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from hippodrome.core.types import StartPose
+from hippodrome.sim.geo_start import GeoStart
 from hippodrome.sim.renamed import present_value
 
 DONE, THRESHOLD_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -123,13 +124,28 @@ def seed(text: str) -> int:
     return value
 
 
-def start_pose(text: str) -> StartPose:
-    """``X,Y,HEADING`` in metres and degrees."""
+def start_pose(text: str) -> StartPose | GeoStart:
+    """``X,Y,HEADING`` in metres and degrees, or ``geo:LAT,LON[,HEADING]`` in degrees, the heading as a compass shows it."""
+    if text.startswith("geo:"):
+        return _geo_start(text)
     try:
         x_m, y_m, heading_deg = (float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"'{text}' is not X,Y,HEADING (metres, metres, degrees)") from None
     return StartPose(x_m, y_m, math.radians(heading_deg))
+
+
+def _geo_start(text: str) -> GeoStart:
+    try:
+        lat_deg, lon_deg, *heading = (float(part) for part in text.removeprefix("geo:").split(","))
+    except ValueError:
+        heading = [math.nan]
+        lat_deg = lon_deg = math.nan
+    if len(heading) > 1 or not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0 and all(map(math.isfinite, heading))):
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not geo:LAT,LON or geo:LAT,LON,HEADING (WGS84 degrees; heading in degrees clockwise from north)"
+        )
+    return GeoStart(lat_deg, lon_deg, heading[0] if heading else None)
 
 
 def refine_mode(text: str) -> str:

@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any, Literal
 
-from hippodrome.eval.commands.arguments import DONE, add_command
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command
 
-EXPORTS = ("tum", "kitti", "euroc", "mcap", "rerun", "evo", "rosbag2")
+EXPORTS = ("tum", "kitti", "euroc", "mcap", "rerun", "evo", "rosbag2", "gpx", "geojson")
 IMPORTS = ("tum", "kitti", "euroc", "mcap", "rosbag")
 
 
@@ -19,17 +19,23 @@ def add_exchange_commands(commands: Any) -> None:
         """Write the drives of a run, with truth, trajectories, frames, self-motion, maps and roads, in another tool's format.
 
         Writes a new folder; its about.json says which frames of reference, units and precision hold in it. MCAP, Rerun, evo and
-        ROS 2 bags need packages: pip install 'hippodrome[exchange]'.""",
+        ROS 2 bags need packages: pip install 'hippodrome[exchange]'. GPX and GeoJSON need a network that says where on Earth it
+        lies, as those made of OpenStreetMap do.""",
         ["hippodrome export out/eval --to mcap --out out/for-foxglove",
-         "hippodrome export out/grid/recordings/grid-mapping-* --to tum --out out/grid-tum"],
+         "hippodrome export out/grid/recordings/grid-mapping-* --to tum --out out/grid-tum",
+         "hippodrome export topo.pbstream --to geojson --network town.net.xml --out web"],
     )  # fmt: skip
     out.add_argument(
-        "source", type=Path, metavar="FOLDER", help="the results of a whole run, the folder of one scenario in it, or a recording"
+        "source",
+        type=Path,
+        metavar="FOLDER",
+        help="the results of a whole run, the folder of one scenario in it, or a recording; for gpx and geojson also one map "
+        "(.pbstream) or trajectory (.tum)",
     )
     out.add_argument(
         "--to", required=True, choices=EXPORTS,
         help="the format. tum, kitti, euroc: the layouts of these datasets; mcap: for Foxglove; rerun: for the Rerun viewer; "
-             "evo: results for evo_res; rosbag2: for ros2 bag",
+             "evo: results for evo_res; rosbag2: for ros2 bag; gpx, geojson: latitude and longitude, for any web map",
     )  # fmt: skip
     out.add_argument(
         "--network", type=Path, metavar="NET.net.xml[.gz]",
@@ -61,9 +67,7 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
         help="the self-motion: a .csv of t_s,speed,yaw_rate (seconds, any unit of length a second, radians a second), a .tum of "
              "poses, or the word 'truth' to differentiate the true poses (default: what the layout has)",
     )  # fmt: skip
-    into.add_argument(
-        "--truth", type=Path, metavar="FILE.tum", help="true poses to score with (default: the layout's own, if any)"
-    )
+    _add_truth(into, "the layout's own, if any")
     into.add_argument(
         "--axes", choices=["body", "camera"],
         help="which way poses point: body: x forward, z up; camera: z forward, y down (default: body; for kitti, camera)",
@@ -81,18 +85,78 @@ def _add_score(commands: Any) -> None:
         commands, "score", _score, "score a map or a trajectory against a recording's truth",
         """Print the absolute and relative errors (APE, RPE; metres) of a map or a trajectory, each with its definition.
 
-        The recording may be one of ours or an imported one that came with its truth.""",
+        The recording may be one of ours or an imported one that came with its truth; or the truth is a file of its own, poses or
+        fixes in latitude and longitude. Truth that comes more seldom than four times a second is scored at its own times. Poses
+        in space are turned level before height, roll and pitch are dropped. Exit status 1: a limit was missed.""",
         ["hippodrome score out/grid/topo.pbstream out/grid/recordings/grid-mapping-*",
-         "hippodrome score visual-odometry.tum recordings/kitti-07 --own-frame"],
+         "hippodrome score visual-odometry.tum recordings/kitti-07 --own-frame",
+         "hippodrome score topo.pbstream recordings/monday --truth phone.gpx --network town.net.xml --max-ape 5"],
     )  # fmt: skip
     score.add_argument(
-        "estimate", type=Path, metavar="MAP.pbstream|TRAJECTORY.tum", help="what is scored: a map or a TUM trajectory"
-    )
+        "estimate", type=Path, metavar="MAP.pbstream|TRAJECTORY.tum",
+        help="what is scored: a map, a TUM trajectory, or KITTI's 12 columns with --times",
+    )  # fmt: skip
     score.add_argument("recording", type=Path, metavar="RECORDING", help="the recording whose truth it is held against")
     score.add_argument(
         "--own-frame", action="store_true",
         help="the trajectory has a frame and a scale of its own: align it in several ways and print the errors of each",
     )  # fmt: skip
+    score.add_argument(
+        "--axes", choices=["body", "camera"],
+        help="which way poses point: body: x forward, z up; camera: z forward, y down (default: body; for 12 columns, camera)",
+    )  # fmt: skip
+    score.add_argument(
+        "--times", type=Path, metavar="FILE", help="seconds, a line for each of KITTI's poses (default: none; KITTI's need it)"
+    )
+    score.add_argument(
+        "--clock", choices=["auto", "source", "recording"], default="auto",
+        help="the clock of the trajectory: source: that of the drive as it was imported; recording: 0 at the recording's start; "
+             "auto: recording for files that hippodrome wrote, source for others (default: auto)",
+    )  # fmt: skip
+    _add_truth(score, "the recording's own")
+    score.add_argument(
+        "--time-offset", type=float, default=0.0, metavar="S", help="seconds to add to the times of --truth (default: 0)"
+    )
+    score.add_argument(
+        "--max-gap", type=_above_zero, metavar="S",
+        help="do not interpolate between samples farther apart than this, in seconds (default: 0.25; at sparse truth 1, or "
+             "twice the estimate's usual interval)",
+    )  # fmt: skip
+    score.add_argument("--json", type=Path, metavar="FILE", help="also write the figures into this file (default: none)")
+    score.add_argument(
+        "--max-ape",
+        type=_above_zero,
+        metavar="M",
+        help="exit status 1 if the mean of the first APE is larger (default: no limit)",
+    )
+    score.add_argument(
+        "--max-rpe", type=_above_zero, metavar="M", help="exit status 1 if the mean RPE over 20 m is larger (default: no limit)"
+    )
+
+
+def _add_truth(parser: argparse.ArgumentParser, default: str) -> None:
+    """The truth as a file, its projection and its accuracy."""
+    parser.add_argument(
+        "--truth", type=Path, metavar="FILE",
+        help="true poses (.tum), or fixes: GPX, CSV with the columns t_s, lat, lon, NMEA, GeoJSON, the folder of OXTS data "
+             f"(default: {default})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--network", type=Path, metavar="NET.net.xml[.gz]",
+        help="the road network into whose frame fixes are projected, so that a topometric map is scored as it lies (default: a "
+             "plane of their own)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--truth-sigma", type=_above_zero, metavar="M",
+        help="accuracy of the truth: standard deviation along one axis, metres (default: as the file says)",
+    )  # fmt: skip
+
+
+def _above_zero(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    return value
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -119,14 +183,20 @@ def import_command(options: argparse.Namespace) -> int:
 
     axes: Literal["body", "camera"] = options.axes or ("camera" if options.kind == "kitti" else "body")
     import_drive(
-        ImportOptions(options.source, options.kind, options.out, options.odometry, options.truth, axes, options.truth_frame,
-                      options.size)
+        ImportOptions(options.source, options.kind, options.out, options.odometry, options.truth, options.network,
+                      options.truth_sigma, axes, options.truth_frame, options.size)
     )  # fmt: skip
     return DONE
 
 
 def _score(options: argparse.Namespace) -> int:
-    from hippodrome.eval.exchange.score import score_files
+    from hippodrome.eval.exchange.score import ScoreOptions, score_files
 
-    score_files(options.estimate, options.recording, not options.own_frame)
-    return DONE
+    held = score_files(
+        ScoreOptions(
+            options.estimate, options.recording, not options.own_frame, options.axes, options.times, options.clock, options.truth,
+            options.network, options.truth_sigma, options.time_offset, options.max_gap, options.json, options.max_ape,
+            options.max_rpe,
+        )
+    )  # fmt: skip
+    return DONE if held else THRESHOLD_FAILED

@@ -46,9 +46,10 @@ def add_stage_commands(commands: Any) -> None:
              "from a known start (default: route; 'default', its former name, goes on working)",
     )  # fmt: skip
     refine.add_argument(
-        "--start", type=start_pose, metavar="X,Y,HEADING",
-        help="pose at the start of the drive, in the network's frame: metres, metres, degrees counter-clockwise from east "
-             "(default: unknown; --mode paper needs it)",
+        "--start", type=start_pose, metavar="X,Y,HEADING|geo:LAT,LON[,HEADING]",
+        help="pose at the start of the drive. X,Y,HEADING: the network's metres, degrees counter-clockwise from east. "
+             "geo:LAT,LON[,HEADING]: a GPS fix in WGS84 degrees, heading of a compass, clockwise from north; it may be left out "
+             "(default: unknown; --mode paper needs it, with a heading)",
     )  # fmt: skip
     _add_settings(refine, "refinement")
     refine.add_argument("--out", type=Path, required=True, metavar="MAP.pbstream", help="file for the topometric map")
@@ -89,9 +90,12 @@ def _map(options: argparse.Namespace) -> int:
 
 
 def _refine(options: argparse.Namespace) -> int:
+    from hippodrome.eval.files.scenarios import located
     from hippodrome.eval.methods.stages import refine_files
+    from hippodrome.sim.georeference import placed_start
 
-    refine_files(options.map, options.network, options.mode, options.start, options.scenario, options.out)
+    start = placed_start(options.start, located(options.network, "--network"), options.mode)
+    refine_files(options.map, options.network, options.mode, start, options.scenario, options.out)
     return DONE
 
 

@@ -8,8 +8,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
+from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.exported import ExportedDrive, gather_drives
 from hippodrome.eval.exchange.drives.folder import new_folder
+from hippodrome.eval.exchange.drives.on_earth import placed_file
 from hippodrome.eval.exchange.extra import optional_module
 
 # Format -> module below ``formats``. Those with packages of the extra are imported only when they are asked for.
@@ -21,6 +23,8 @@ FORMATS: Final = {
     "rerun": "rerun_file",
     "evo": "evo_results",
     "rosbag2": "rosbag2_folder",
+    "gpx": "gpx",
+    "geojson": "geojson",
 }
 ABOUT: Final = "about.json"
 
@@ -38,6 +42,9 @@ def export(folder: Path, to: str, network: Path | None, out: Path) -> None:
         HippodromeError: The folder has nothing to export, or ``out`` cannot be written; then nothing is left.
     """
     writer = optional_module(f"hippodrome.eval.exchange.formats.{FORMATS[to]}")
+    if folder.is_file():
+        _export_file(folder, to, network, out, writer)
+        return
     drives = gather_drives(folder, network)
     with new_folder(out) as building:
         writer.write(drives, building)
@@ -49,6 +56,19 @@ def export(folder: Path, to: str, network: Path | None, out: Path) -> None:
     for drive in drives:
         if drive.network is None:
             print(f"note: {drive.name}: its road network was not found and is left out; name it with --network")
+
+
+def _export_file(source: Path, to: str, network: Path | None, out: Path, writer: Any) -> None:
+    """Write one map or trajectory. Raises ExchangeError for the formats that need whole drives."""
+    if not hasattr(writer, "write_one"):
+        raise ExchangeError(f"{source}: --to {to} takes a folder of results or a recording; single files go to gpx and geojson")
+    if network is None:
+        raise ExchangeError(f"{source}: nobody knows where on Earth it lies; name its road network with --network")
+    with new_folder(out) as building:
+        writer.write_one(placed_file(source, network), building)
+        about = {"made_by": f"hippodrome {version('hippodrome')}", "format": to, "conventions": list(writer.CONVENTIONS)}
+        (building / ABOUT).write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
+    print(f"{out}: {source.name} as {to}; conventions in {out / ABOUT}")
 
 
 def _about(to: str, conventions: Sequence[str], drives: Sequence[ExportedDrive]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from hippodrome.eval.metrics.association import TrajectoryError, check_trajector
 
 MAX_BYTES = 256 << 20  # about two million poses
 COLUMNS = 8
+HEAD = "# t_s x y z qx qy qz qw"  # the first line of what we write: its times are the recording's, not those of a foreign drive
 
 
 def write_tum(path: Path, trajectory: Trajectory) -> None:
@@ -24,7 +25,7 @@ def write_tum(path: Path, trajectory: Trajectory) -> None:
     half = trajectory.poses[:, 2] / 2.0
     rows = zip(trajectory.t_s, trajectory.poses[:, 0], trajectory.poses[:, 1], np.sin(half), np.cos(half), strict=True)
     lines = [f"{t_s!r} {x!r} {y!r} 0 0 0 {qz!r} {qw!r}" for t_s, x, y, qz, qw in (map(float, row) for row in rows)]
-    write_atomically(path, ("# t_s x y z qx qy qz qw\n" + "\n".join(lines) + "\n").encode())
+    write_atomically(path, (HEAD + "\n" + "\n".join(lines) + "\n").encode())
 
 
 def read_tum(path: Path) -> Trajectory:
@@ -32,10 +33,14 @@ def read_tum(path: Path) -> Trajectory:
     try:
         if (size := path.stat().st_size) > MAX_BYTES:
             raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise TrajectoryError(f"{path}: cannot be read as text: {error}") from error
-    rows = [_row(path, number, line) for number, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
+    rows = [
+        _row(path, number, line)
+        for number, line in enumerate(lines, start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
     if not rows:
         raise TrajectoryError(f"{path}: no poses")
     table = np.array(rows)

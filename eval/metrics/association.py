@@ -69,6 +69,29 @@ def associate(
     )
 
 
+def associate_at_reference(
+    estimate: Trajectory, reference: Trajectory, *, max_gap_s: float, min_coverage: float = MIN_COVERAGE
+) -> Association:
+    """Estimated poses at the reference's time stamps, for a reference that is the sparser of the two.
+
+    Only samples of the reference between the estimate's first and last time count. ``index`` numbers these, ``total`` says how
+    many they are, and the stretches of ``segment`` are those of the estimate. Arguments and errors as of ``associate``, except
+    that it is the estimate's samples that may be ``max_gap_s`` apart.
+    """
+    check_trajectory(estimate, "estimate")
+    check_trajectory(reference, "reference")
+    inside = (reference.t_s >= estimate.t_s[0]) & (reference.t_s <= estimate.t_s[-1])
+    if not inside.any():
+        raise CoverageError(
+            f"none of the {len(reference.t_s)} true samples ({reference.t_s[0]:.1f} to {reference.t_s[-1]:.1f} s) lies in the "
+            f"estimate's time ({estimate.t_s[0]:.1f} to {estimate.t_s[-1]:.1f} s); check clocks and time spans"
+        )
+    swapped = associate(
+        Trajectory(reference.t_s[inside], reference.poses[inside]), estimate, max_gap_s=max_gap_s, min_coverage=min_coverage
+    )
+    return Association(swapped.t_s, swapped.reference, swapped.estimate, swapped.index, swapped.segment, swapped.total)
+
+
 def check_trajectory(trajectory: Trajectory, name: str) -> None:
     """Raise TrajectoryError unless the shapes agree, there are samples, all values are finite and times increase.
 

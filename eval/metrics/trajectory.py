@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,11 @@ from hippodrome.eval.metrics.association import (
     MIN_COVERAGE,
     Association,
     associate,
+    associate_at_reference,
 )
 
 Pairing: TypeAlias = Literal["all", "chained"]
+Instants: TypeAlias = Literal["estimate", "reference"]
 Indices: TypeAlias = NDArray[np.intp]
 
 PATH_TOLERANCE = 0.1  # evo's default: a pair counts if the path between its samples is within 10 % of the delta
@@ -80,6 +82,7 @@ def ape(
     *,
     max_gap_s: float = MAX_GAP_S,
     min_coverage: float = MIN_COVERAGE,
+    at: Instants = "estimate",
 ) -> Score:
     """Absolute position error: the distance of each estimated position to the reference at the same instant.
 
@@ -89,16 +92,18 @@ def ape(
         alignment: How the estimate is moved before distances are taken, see ``find_alignment``.
         max_gap_s: Reference samples farther apart than this are not interpolated.
         min_coverage: Least share of the estimated samples that must have ground truth.
+        at: At whose time stamps the two are compared: the estimate's, or, where the truth is the sparser one, the reference's.
 
     Raises:
         HippodromeError: One of the two is no trajectory, too few samples have ground truth, or the alignment is degenerate.
     """
-    pairs = associate(estimate, reference, max_gap_s=max_gap_s, min_coverage=min_coverage)
+    pairs = _ASSOCIATE[at](estimate, reference, max_gap_s=max_gap_s, min_coverage=min_coverage)
     transform = find_alignment(alignment, pairs.estimate, pairs.reference)
     moved = apply_to_positions(transform, pairs.estimate[:, :2])
     offsets = moved[:, :2] - pairs.reference[:, :2]
     errors_m = np.hypot(offsets[:, 0], offsets[:, 1])
-    definition = f"APE, position, m; per estimated sample; alignment {LABELS[alignment]}; {_reference_clause(max_gap_s)}"
+    per = "estimated sample" if at == "estimate" else "true sample"
+    definition = f"APE, position, m; per {per}; alignment {LABELS[alignment]}; {_reference_clause(max_gap_s, at)}"
     return Score(definition, errors_m, pairs.t_s, len(pairs.t_s), pairs.total)
 
 
@@ -110,6 +115,7 @@ def rpe(
     pairing: Pairing = "all",
     max_gap_s: float = MAX_GAP_S,
     min_coverage: float = MIN_COVERAGE,
+    at: Instants = "estimate",
 ) -> Score:
     """Relative pose error, translation: the motion between two samples, estimated against true.
 
@@ -123,11 +129,12 @@ def rpe(
         pairing: With a delta, whether a pair begins at every sample (``all``), or where the one before ended (``chained``).
         max_gap_s: Reference samples farther apart than this are not interpolated, and no pair spans such a gap.
         min_coverage: Least share of the estimated samples that must have ground truth.
+        at: At whose time stamps the two are compared: the estimate's, or, where the truth is the sparser one, the reference's.
 
     Raises:
         HippodromeError: One of the two is no trajectory, too few samples have ground truth, or there is no pair.
     """
-    matched = associate(estimate, reference, max_gap_s=max_gap_s, min_coverage=min_coverage)
+    matched = _ASSOCIATE[at](estimate, reference, max_gap_s=max_gap_s, min_coverage=min_coverage)
     first, second, clause = _pairs(matched, delta_m, pairing)
     if len(first) == 0:
         raise MetricError(
@@ -136,7 +143,7 @@ def rpe(
     estimated = se2.between(matched.estimate[first], matched.estimate[second])
     true = se2.between(matched.reference[first], matched.reference[second])
     offsets = estimated[:, :2] - true[:, :2]
-    definition = f"RPE, translation, m; {clause}; no alignment, no scale correction; {_reference_clause(max_gap_s)}"
+    definition = f"RPE, translation, m; {clause}; no alignment, no scale correction; {_reference_clause(max_gap_s, at)}"
     return Score(definition, np.hypot(offsets[:, 0], offsets[:, 1]), matched.t_s[second], len(matched.t_s), matched.total)
 
 
@@ -215,5 +222,10 @@ def _runs(segment: IntArray) -> list[tuple[int, int]]:
     return list(pairwise(bounds))
 
 
-def _reference_clause(max_gap_s: float) -> str:
+_ASSOCIATE: Final = {"estimate": associate, "reference": associate_at_reference}
+
+
+def _reference_clause(max_gap_s: float, at: Instants) -> str:
+    if at == "reference":
+        return f"at the truth's times, estimate linear in time within gaps <= {max_gap_s:g} s"
     return f"reference linear in time within gaps <= {max_gap_s:g} s"

@@ -9,13 +9,17 @@ import re
 import shlex
 import shutil
 import tomllib
+from datetime import UTC, datetime
 from importlib.util import find_spec
 
+import numpy as np
 import pytest
 
 from benchmarks.same.__main__ import _parser as parser_of_same
 from hippodrome.eval.cli import main, make_parser
 from hippodrome.eval.sweep.grid import make_grid, parse_parameter
+from hippodrome.sim.georeference import read_georeference
+from hippodrome.sim.recording import open_recording
 from tests.docs.documents import ROOT, documents
 
 DOCUMENTS = pytest.mark.parametrize("page", documents(), ids=str)
@@ -191,6 +195,25 @@ def cheap_commands():
     return [pytest.param(words, id=f"{page}: {' '.join(words)}") for words, page in found.items()]
 
 
+def on_earth(network, recording, folder):
+    """The network with a place on Earth, and fixes of the drive there, once a second."""
+    projection = "+proj=utm +zone=32 +datum=WGS84 +units=m"
+    location = (
+        f'<location netOffset="-454791,-5425352" projParameter="{projection}" convBoundary="0,0,1,1" origBoundary="0,0,1,1"/>'
+    )
+    before, _, after = network.read_text().partition("<location")
+    (folder / "karlsruhe.net.xml").write_text(before + location + after.partition("/>")[2])
+    truth = open_recording(recording).ground_truth()
+    keep = np.flatnonzero(np.diff(np.floor(truth.t_s), prepend=-1.0) > 0.0)
+    places = read_georeference(folder / "karlsruhe.net.xml").to_lat_lon(truth.poses[keep])
+    points = "".join(
+        f'<trkpt lat="{lat:.9f}" lon="{lon:.9f}"><time>{datetime.fromtimestamp(t_s, UTC).isoformat()}</time></trkpt>'
+        for t_s, (lat, lon) in zip(truth.t_s[keep].tolist(), places, strict=True)
+    )
+    (folder / "phone.gpx").write_text(f"<gpx><trk><trkseg>{points}</trkseg></trk></gpx>")
+    return folder / "karlsruhe.net.xml", folder / "phone.gpx"
+
+
 @pytest.fixture(scope="module")
 def files(run, tmp_path_factory):
     """What stands for a file in the documents, and a real one."""
@@ -201,7 +224,9 @@ def files(run, tmp_path_factory):
     imported = shutil.copy(
         network, folder / "my_town.net.xml"
     )  # netconvert's own imports are tested in tests/sim/test_map_import.py
+    placed, fixes = on_earth(network, mapping, folder)
     return {
+        "karlsruhe.net.xml": placed, "phone.gpx": fixes,
         "RECORDING": mapping, "OTHER_RECORDING": drive, "FOLDER": mapping, "DIR": run.out, "A": run.out, "B": run.out,
         "SOURCE": next(path.parent for path in folder.rglob("rgb.txt")),
         "town.net.xml": network, "FILE": imported, "my_town.osm": imported, "map.osm": imported,
@@ -215,7 +240,7 @@ def files(run, tmp_path_factory):
 def test_a_cheap_command_runs(words, files, run, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     arguments = [str(files.get(word, word)) for word in words]
-    if words[0] == "export":
+    if words[0] == "export" and words[1] != "topo.pbstream":
         arguments[1] = str(files["FOLDER"])
     for place, word in enumerate(words):
         if word == "--out":  # a new place; a drive that is drawn already is not drawn again

@@ -43,6 +43,7 @@ class ExportedDrive:
     estimates: dict[str, Estimate]  # by method
     maps: dict[str, CognitiveMap]  # by the stem of the map's file
     network: RoadNetwork | None  # None: its file was not found
+    network_file: Path | None = None
 
 
 def gather_drives(folder: Path, network: Path | None) -> list[ExportedDrive]:
@@ -94,7 +95,7 @@ def _drive(
     if DEAD_RECKONING not in estimates:
         estimates[DEAD_RECKONING] = Estimate(dead_reckoning(recording.self_motion())[0], "own")
     roads = read_network(network) if network is not None else None
-    return ExportedDrive(name, recording, truth_of(recording), estimates, maps, roads)
+    return ExportedDrive(name, recording, truth_of(recording), estimates, maps, roads, network)
 
 
 def _frame_of(method: str) -> Literal["network", "own"]:

@@ -16,6 +16,7 @@ from hippodrome.core.types import Frame
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignFrame
 from hippodrome.eval.exchange.drives.images import decode
+from hippodrome.eval.exchange.drives.truth import TRUTH_FILE
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import CHUNK_FRAMES, FORMAT, MANIFEST, chunk_count, chunk_path, write_arrays, write_chunk
 
@@ -72,5 +73,7 @@ def seal(folder: Path, content: dict[str, Any], samples: Samples) -> None:
     which others, nobody knows.
     """
     names = ["samples.npz", *(chunk_path(folder, chunk).name for chunk in range(chunk_count(samples)))]
+    if (folder / TRUTH_FILE).exists():
+        names.append(TRUTH_FILE)
     manifest = {"format": FORMAT, **content, "sha256": {name: sha256_of(folder / name) for name in names}}
     write_atomically(folder / MANIFEST, (json.dumps(manifest, indent=1, sort_keys=True) + "\n").encode())

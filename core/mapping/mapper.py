@@ -44,6 +44,24 @@ class MapperConfig:
     attractor: MapperAttractorConfig = field(default_factory=MapperAttractorConfig)
 
 
+class _Blind:
+    """Keyframes of a drive without any frame: where one was due, although there was nothing to see."""
+
+    def __init__(self, config: KeyframeConfig) -> None:
+        self._config = config
+        self.state = keyframes.start()
+        self.t_s: list[float] = []
+        self.motions: list[FloatArray] = []
+
+    def step(self, observation: Observation) -> None:
+        """Take one observation."""
+        self.state = keyframes.advance(self.state, observation, self._config)
+        if keyframes.is_due(self.state, self._config):
+            self.motions.append(self.state.motion if self.t_s else np.zeros(3))
+            self.t_s.append(observation.t_s)
+            self.state = keyframes.restart(self.state)
+
+
 class MappingError(HippodromeError):
     """A drive that no map can be made of."""
 
@@ -60,9 +78,14 @@ class Mapper:
         self._closures: list[Closure] = []
         self._neural: NeuralPose | None = None  # the networks now; None until they start
         self._neural_at: list[NeuralPose] = []  # the networks at each keyframe, once they have started
+        self._blind: _Blind | None = _Blind(config.view_step)  # kept until the first frame comes
 
     def step(self, observation: Observation) -> None:
         """Take one observation: path integration, and a keyframe where one is due and there is a frame."""
+        if observation.frame is not None:
+            self._blind = None
+        if self._blind is not None:
+            self._blind.step(observation)
         self._since_keyframe = keyframes.advance(self._since_keyframe, observation, self._config.view_step)
         self._integrate_paths(observation)
         if not keyframes.is_due(self._since_keyframe, self._config.view_step) or observation.frame is None:
@@ -75,9 +98,15 @@ class Mapper:
     def finish(self) -> CognitiveMap:
         """The semi-metric cognitive map of everything seen.
 
+        A drive without any frame has keyframes all the same, by its motion. Its map has no view cells, so that it closes no loop
+        and nothing can be localized in it; ``view_cell`` is -1 throughout.
+
         Raises:
-            MappingError: the vehicle never moved with a frame in view.
+            MappingError: the vehicle never moved, or never with a frame in view although there were frames.
         """
+        if self._blind is not None and self._blind.t_s:
+            self._t_s, self._motions, self._since_keyframe = self._blind.t_s, self._blind.motions, self._blind.state
+            self._memory.vertex_cell = [-1] * len(self._t_s)
         if not self._t_s:
             raise MappingError("the drive has no view: no frame was taken while the vehicle moved")
         cells = self._memory.finish(self._since_keyframe.spacing)

@@ -39,7 +39,7 @@ def read_calibration(path: Path) -> Calibration:
 
 def _of_yaml(path: Path, text: str) -> Calibration:
     """A calibration in YAML, also of OpenCV's kind, whose head and tags YAML itself does not know."""
-    plain = re.sub(r"!!?opencv-\w+", "", re.sub(r"(?m)^%YAML.*$", "", text))
+    plain = re.sub(r"!!?opencv-[\w-]+", "", re.sub(r"(?m)^%YAML.*$", "", text))
     try:
         values: Any = yaml.safe_load(plain)
     except (yaml.YAMLError, RecursionError) as error:

@@ -216,7 +216,7 @@ class CognitiveMap:
     frame: Literal["semi-metric", "network"]
     t_s: FloatArray  # (V,) when the vertex was made
     poses: FloatArray  # (V, 3) map units in the semi-metric frame; metres in the network frame
-    view_cell: IntArray  # (V,) index into view_cells; several vertices may share a cell
+    view_cell: IntArray  # (V,) index into view_cells; several vertices may share a cell; -1 if there are none
     view_cells: ViewCells
     edges: Edges
     visits: Visits

@@ -21,8 +21,11 @@ def check_map(cognitive_map: CognitiveMap) -> None:
     cells, edges = cognitive_map.view_cells, cognitive_map.edges
     if len(cells.shape) > MAX_DESCRIPTOR_DIMENSIONS or prod(cells.shape) != len(cells.mean):
         raise FieldError(f"descriptor shape {cells.shape[:MAX_DESCRIPTOR_DIMENSIONS]} does not make {len(cells.mean)} values")
+    views = len(cells.templates)
+    lowest = 0 if views else -1  # a drive without frames has no view cell, and each vertex says so
+    within = (cognitive_map.view_cell >= lowest) & (cognitive_map.view_cell < views)
+    _require(within, "view_cell", f"outside {lowest}..{views - 1}")
     for name, index, count in (
-        ("view_cell", cognitive_map.view_cell, len(cells.templates)),
         ("edges.source", edges.source, vertices),
         ("edges.target", edges.target, vertices),
         ("edges.kind", edges.kind, len(EdgeKind)),

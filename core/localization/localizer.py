@@ -80,6 +80,10 @@ class Localizer:
                 f"localization needs a map in the network frame with vertices, got frame {cognitive_map.frame!r} with "
                 f"{len(cognitive_map.poses)} vertices: refine the map first"
             )
+        if len(cognitive_map.view_cells.templates) == 0:
+            raise HippodromeError(
+                "the map has no views: it was made of a drive without frames, and no place in it can be recognised"
+            )
         centre_m = np.mean(cognitive_map.poses[:, :2], axis=0)
         self._config = config
         self._places = make_place_map(cognitive_map, network, config.lane_sigma_m, config.injection.map_m)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command
 
 EXPORTS = ("tum", "kitti", "euroc", "mcap", "rerun", "evo", "rosbag2", "gpx", "geojson")
-IMPORTS = ("tum", "kitti", "euroc", "mcap", "rosbag")
+IMPORTS = ("images", "video", "odometry", "kitti", "kitti-raw", "tum", "euroc", "donkeycar", "mcap", "rosbag")
+TIME_UNITS = ("s", "ms", "us", "ns")
 
 
 def add_exchange_commands(commands: Any) -> None:
@@ -48,12 +49,17 @@ def add_exchange_commands(commands: Any) -> None:
         """Make a recording of a drive that somebody else recorded: frames, self-motion and, where it is known, truth.
 
         `hippodrome map`, `refine`, `localize`, `score` and `export` take the recording like one of ours. Frames and self-motion
-        need the same clock; speed may be in any unit of length. MCAP files and ROS bags need packages: pip install
-        'hippodrome[exchange]'. docs/exchange.md says what each layout must hold.""",
-        ["hippodrome import rgbd_dataset --from tum --odometry odometry.csv --out recordings/office",
-         "hippodrome import kitti/sequences/07 --from kitti --odometry truth --size 160x48 --out recordings/kitti-07"],
+        need the same clock, or an offset between their clocks; speed may be in any unit of length. MCAP files and ROS bags need
+        packages: pip install 'hippodrome[exchange]'. docs/exchange.md says what each layout must hold.""",
+        ["hippodrome import dashcam.mp4 --odometry phone.csv --out recordings/home",
+         "hippodrome import photos --fps 5 --odometry wheels.csv --time-offset -2.5 --out recordings/photos",
+         "hippodrome import kitti/sequences/07 --odometry kitti/poses/07.txt --size 414x125 --out recordings/kitti-07",
+         "hippodrome import drive.tum --from odometry --out recordings/no-camera"],
     )  # fmt: skip
-    into.add_argument("source", type=Path, metavar="SOURCE", help="the sequence's folder, an .mcap file, or a ROS 1 or ROS 2 bag")
+    into.add_argument(
+        "source", type=Path, metavar="SOURCE",
+        help="a video, a folder of images, a sequence's folder, a tub, an .mcap file, a ROS bag, or a file of self-motion",
+    )  # fmt: skip
     add_drive_options(into)
     into.add_argument("--out", type=Path, required=True, metavar="RECORDING", help="a new folder; one that exists is not touched")
     _add_score(commands)
@@ -61,11 +67,38 @@ def add_exchange_commands(commands: Any) -> None:
 
 def add_drive_options(into: argparse.ArgumentParser) -> None:
     """How a drive that was recorded elsewhere is taken in: of `import`, and of what imports by itself."""
-    into.add_argument("--from", required=True, choices=IMPORTS, dest="kind", help="the layout of the source")
+    into.add_argument(
+        "--from", choices=IMPORTS, dest="kind",
+        help="the layout of the source (default: recognised by what lies in it)",
+    )  # fmt: skip
+    into.add_argument(
+        "--fps", type=_rate, metavar="N",
+        help="frames a second, for a folder of images, a video without time stamps, or poses without times (default: the "
+             "source's own times)",
+    )  # fmt: skip
     into.add_argument(
         "--odometry", metavar="FILE",
-        help="the self-motion: a .csv of t_s,speed,yaw_rate (seconds, any unit of length a second, radians a second), a .tum of "
-             "poses, or the word 'truth' to differentiate the true poses (default: what the layout has)",
+        help="the self-motion: a .csv with columns for time, speed and yaw rate (any unit of length a second; radians a second), "
+             "a file of poses (TUM's or KITTI's), the word 'truth' to differentiate the true poses, or the word 'visual' to "
+             "estimate it from the frames, roughly (default: what the layout has)",
+    )  # fmt: skip
+    into.add_argument(
+        "--time-unit",
+        choices=TIME_UNITS,
+        help="unit of the times in the file of self-motion (default: its header's, or recognised by size and interval)",
+    )
+    into.add_argument(
+        "--time-offset", type=float, default=0.0, metavar="S", dest="time_offset_s",
+        help="seconds to add to the times of the self-motion, to lay its clock on that of the frames (default: 0)",
+    )  # fmt: skip
+    into.add_argument(
+        "--calibration", type=Path, metavar="FILE",
+        help="the camera's calibration: KITTI's calib.txt, nine numbers of a matrix, OpenCV's or ROS's YAML; frames are freed of "
+             "the distortion that it describes (default: the layout's focal length, if any)",
+    )  # fmt: skip
+    into.add_argument(
+        "--camera-height", type=_rate, default=1.5, metavar="M", dest="camera_height_m",
+        help="height of the camera above the road in metres, for --odometry visual (default: 1.5)",
     )  # fmt: skip
     _add_truth(into, "the layout's own, if any")
     into.add_argument(
@@ -159,6 +192,16 @@ def _above_zero(text: str) -> float:
     return value
 
 
+def _rate(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.01 <= value <= 10_000.0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0.01 to 10000")
+    return value
+
+
 def _size(text: str) -> tuple[int, int]:
     width, x, height = text.partition("x")
     try:
@@ -181,10 +224,13 @@ def import_command(options: argparse.Namespace) -> int:
     """``hippodrome import``, with the options of ``add_drive_options``, ``source`` and ``out``."""
     from hippodrome.eval.exchange.importing import ImportOptions, import_drive
 
-    axes: Literal["body", "camera"] = options.axes or ("camera" if options.kind == "kitti" else "body")
     import_drive(
-        ImportOptions(options.source, options.kind, options.out, options.odometry, options.truth, options.network,
-                      options.truth_sigma, axes, options.truth_frame, options.size)
+        ImportOptions(
+            source=options.source, kind=options.kind, out=options.out, odometry=options.odometry, truth=options.truth,
+            network=options.network, truth_sigma_m=options.truth_sigma, axes=options.axes, truth_frame=options.truth_frame,
+            size_px=options.size, fps=options.fps, time_unit=options.time_unit, time_offset_s=options.time_offset_s,
+            calibration=options.calibration, camera_height_m=options.camera_height_m,
+        )
     )  # fmt: skip
     return DONE
 

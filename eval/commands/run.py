@@ -6,9 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.core.types import HippodromeError
 from hippodrome.eval.commands.arguments import DONE, add_command, start_pose
-from hippodrome.eval.commands.exchange import IMPORTS, add_drive_options, add_exchange_commands, import_command
+from hippodrome.eval.commands.exchange import add_drive_options, add_exchange_commands, import_command
 
 
 def add_drive_command(commands: Any) -> None:
@@ -21,25 +20,22 @@ def add_drive_command(commands: Any) -> None:
         that no road vouches for, with its cause and what to do next. Beside it lie the recording, both maps and the converted
         network. A stage that is done is not done again: the same command resumes. A map that nothing vouches for is said in the
         last lines; the exit status is 0 then too.""",
-        ["hippodrome run kitti/sequences/09 --network karlsruhe.osm --from kitti --odometry truth --out out/kitti-09",
+        ["hippodrome run kitti/sequences/09 --network karlsruhe.osm --odometry truth --out out/kitti-09",
          "hippodrome run recordings/monday --network town.net.xml --out out/monday"],
         later_wins=True,
     )  # fmt: skip
     parser.add_argument(
         "drive", type=Path, metavar="DRIVE", help="what was recorded: as for `hippodrome import`, or a recording's folder"
     )
-    add_drive_options(parser)  # of these, --from and --network mean more here
-    parser.add_argument(
-        "--from", choices=IMPORTS, dest="kind", help="the layout of the drive (default: it is a recording already)"
-    )
+    add_drive_options(parser)  # of these, --network means more here
     parser.add_argument(
         "--network", type=Path, required=True, metavar="MAP",
         help="the road network: SUMO (.net.xml), OpenStreetMap (.osm, .pbf) or OpenDRIVE (.xodr), also packed",
     )  # fmt: skip
     parser.add_argument(
-        "--start", type=start_pose, metavar="X,Y,HEADING",
-        help="pose at the start of the drive, in the network's frame: metres, metres, degrees counter-clockwise from east "
-             "(default: unknown, it is searched for)",
+        "--start", type=start_pose, metavar="X,Y,HEADING|geo:LAT,LON[,HEADING]",
+        help="pose at the start of the drive, in the network's frame: metres, metres, degrees counter-clockwise from east; or "
+             "a GPS fix and the heading of a compass (default: unknown, it is searched for)",
     )  # fmt: skip
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="folder for the results; what is finished in it is not made again"
@@ -51,8 +47,6 @@ def _run(options: argparse.Namespace) -> int:
     from hippodrome.sim.recording import MANIFEST
 
     is_recording = (options.drive / MANIFEST).is_file()
-    if options.kind is None and not is_recording:
-        raise HippodromeError(f"{options.drive}: not a recording; say what it is with --from: {', '.join(IMPORTS)}")
 
     def import_to(recording: Path, net_file: Path) -> None:
         wanted = {"source": options.drive, "out": recording, "network": net_file}

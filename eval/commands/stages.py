@@ -90,12 +90,9 @@ def _map(options: argparse.Namespace) -> int:
 
 
 def _refine(options: argparse.Namespace) -> int:
-    from hippodrome.eval.files.scenarios import located
     from hippodrome.eval.methods.stages import refine_files
-    from hippodrome.sim.georeference import placed_start
 
-    start = placed_start(options.start, located(options.network, "--network"), options.mode)
-    refine_files(options.map, options.network, options.mode, start, options.scenario, options.out)
+    refine_files(options.map, options.network, options.mode, options.start, options.scenario, options.out)
     return DONE
 
 

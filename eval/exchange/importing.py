@@ -2,33 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 
-from hippodrome.core.types import Trajectory
+from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.eval.exchange.drives.calibration import Calibration, scaled, undistorter
+from hippodrome.eval.exchange.drives.clock import TimeUnit
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.folder import new_folder
-from hippodrome.eval.exchange.drives.foreign import ForeignDrive, Motion, motion_of
+from hippodrome.eval.exchange.drives.foreign import ForeignDrive, Motion, motion_of, require_increasing
+from hippodrome.eval.exchange.drives.images import decode
 from hippodrome.eval.exchange.drives.new_recording import camera_record, field_of_view_deg, seal, write_frames, write_steps
+from hippodrome.eval.exchange.drives.plausible import require_plausible
 from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.drives.steps import begin_s, frames_within, steps_of
-from hippodrome.eval.exchange.drives.truth import read_truth, require_overlap, truth_of_trajectory, write_truth
+from hippodrome.eval.exchange.drives.truth import Truth, read_truth, require_overlap, truth_of_trajectory, write_truth
+from hippodrome.eval.exchange.drives.visual import visual_motion
 from hippodrome.eval.exchange.extra import optional_module
-from hippodrome.eval.exchange.readers.tables import read_motion
-from hippodrome.eval.files.spatial import flatten, read_poses
+from hippodrome.eval.exchange.readers.calibration import read_calibration
+from hippodrome.eval.exchange.readers.layouts import recognised
+from hippodrome.eval.exchange.readers.pictures import read_image_folder, read_video
+from hippodrome.eval.exchange.readers.self_motion import read_bare_odometry, read_self_motion
+from hippodrome.eval.exchange.readers.tables import is_kitti_poses, read_poses
 
 # Layout -> module below ``readers`` and its function, which takes the source and the axes of its poses.
 READERS: Final = {
     "tum": ("tables", "read_tum_folder"),
     "kitti": ("tables", "read_kitti_sequence"),
+    "kitti-raw": ("kitti_raw", "read_kitti_raw"),
     "euroc": ("tables", "read_euroc_folder"),
+    "donkeycar": ("donkeycar", "read_tub"),
     "mcap": ("mcap_file", "read_mcap"),
     "rosbag": ("rosbag", "read_rosbag"),
 }
 FROM_TRUTH: Final = "truth"  # the value of --odometry that differentiates the truth
+VISUAL: Final = "visual"  # the value of --odometry that looks at the frames
 TruthFrame: TypeAlias = Literal["network", "own"]
 
 
@@ -37,78 +49,171 @@ class ImportOptions:
     """What to import and, where the layout itself does not say it, how to take it."""
 
     source: Path
-    kind: str  # a key of ``READERS``
+    kind: str | None  # a key of ``READERS``, "images", "video" or "odometry"; None: recognised by what the source holds
     out: Path
-    odometry: str | None = None  # a .csv of t_s,speed,yaw_rate, a .tum of poses, or "truth"; None: what the layout has
-    truth: Path | None = None  # TUM poses or fixes that replace the layout's own
+    odometry: str | None = None  # a .csv of t_s,speed,yaw_rate, a file of poses, "truth" or "visual"; None: what the layout has
+    truth: Path | None = None  # poses or fixes that replace the layout's own
     network: Path | None = None  # whose frame fixes are projected into
     truth_sigma_m: float | None = None  # accuracy of the truth along one axis
-    axes: Axes = "body"
+    axes: Axes | None = None  # None: the layout's, which is the camera's for KITTI and else the vehicle's
     truth_frame: TruthFrame = "own"
     size_px: tuple[int, int] | None = None  # width and height to scale frames to; None: as they are
+    fps: float | None = None  # frames a second, where nothing else says when they were taken
+    time_unit: TimeUnit | None = None  # of the file of ``odometry``; None: recognised
+    time_offset_s: float = 0.0  # added to the times of the self-motion
+    calibration: Path | None = None  # of the camera
+    camera_height_m: float = 1.5  # above the road, for "visual"
 
 
 def import_drive(options: ImportOptions) -> None:
     """Write the recording ``options.out`` and say what it is made of. Raises HippodromeError, and then leaves nothing."""
-    name, reader = READERS[options.kind]
-    module = optional_module(f"hippodrome.eval.exchange.readers.{name}")
-    drive: ForeignDrive = getattr(module, reader)(options.source, options.axes)
-    known = (
-        read_truth(options.truth, options.axes, options.network, options.truth_sigma_m)
-        if options.truth
-        else truth_of_trajectory(drive.truth)
-        if drive.truth is not None
-        else None
-    )
+    kind = options.kind or recognised(options.source)
+    axes: Axes = options.axes or ("camera" if kind == "kitti" else "body")
+    options = replace(options, kind=kind, axes=axes)
+    drive = _read(options, kind, axes)
+    if not drive.frames and kind != "odometry":
+        raise ExchangeError(f"{options.source}: no frames in it")
+    require_increasing(np.array([frame.t_s for frame in drive.frames]), f"{options.source}: frames")
+    own_px = _size_of(drive)
+    calibration = _calibration(options, own_px)
+    pose_t_s = drive.pose_t_s if drive.pose_t_s is not None else np.array([frame.t_s for frame in drive.frames])
+    known = _known_truth(options, drive, axes, pose_t_s)
     truth = known.trajectory if known is not None else None
-    motion, origin = _motion(options, drive, truth)
+    motion, origin = _motion(options, drive, truth, calibration)
+    if options.time_offset_s:
+        motion = replace(motion, t_s=motion.t_s + options.time_offset_s)
+        if options.odometry == FROM_TRUTH and known is not None:
+            known = known.moved(options.time_offset_s)
+            truth = known.trajectory
+    require_plausible(motion, f"{options.source}: self-motion ({origin})")
     frames = frames_within(drive.frames, motion, options.source)
     samples = steps_of(frames, motion, truth)
     require_overlap(options.truth, known, begin_s(motion), float(motion.t_s[-1]))
     truth_share = float(np.isfinite(samples.poses_m).all(axis=1).mean())
     with new_folder(options.out) as building:
-        width, height = write_frames(building, frames, options.size_px)
+        undistort = undistorter(calibration, own_px) if calibration and own_px else None
+        width, height = write_frames(building, frames, options.size_px, undistort)
         write_steps(building, samples)
         write_truth(building, known, begin_s(motion))
-        fov_deg = field_of_view_deg(drive.focal_px, drive.frames[0])
+        focal_px = drive.focal_px if calibration is None else float(calibration.matrix[0, 0])
+        fov_deg = field_of_view_deg(focal_px, own_px[0]) if own_px else None
         content: dict[str, Any] = {
             "scenario": None,
             "imported": {
-                "format": options.kind,
+                "format": kind,
                 "source": options.source.name,
                 "self_motion": origin,
                 "time_origin_s": begin_s(motion),
+                **_intrinsics(calibration, own_px, (width, height)),
             },
             "camera": camera_record(samples, (width, height), fov_deg),
             "truth_share": round(truth_share, 6),
             "truth_frame": "network" if known is not None and known.in_network else options.truth_frame,
         }
         seal(building, content, samples)
-    print(f"{options.out}: {len(frames)} frames of {width} x {height}, {len(samples.t_s)} steps over {samples.t_s[-1]:.1f} s; "
+    pictures = f"{len(frames)} frames of {width} x {height}" if frames else "no frames"
+    print(f"{options.out}: {kind}, {pictures}, {len(samples.t_s)} steps over {samples.t_s[-1]:.1f} s; "
           f"self-motion: {origin}; truth for {truth_share:.0%} of the steps")  # fmt: skip
     for note in known.notes if known is not None else ():
         print(f"note: {note}")
     if (lost := len(drive.frames) - len(frames)) > 0:
         print(f"note: {lost} frame(s) outside of the self-motion's time are left out")
+    if not frames:
+        print("note: without frames no place is recognised: the map closes no loop, and no drive can be localized in it")
     if options.odometry == FROM_TRUTH:
         print("note: the self-motion is the truth's own: scores of this drive say nothing about drift")
 
 
-def _motion(options: ImportOptions, drive: ForeignDrive, truth: Trajectory | None) -> tuple[Motion, str]:
+def _read(options: ImportOptions, kind: str, axes: Axes) -> ForeignDrive:
+    """The drive as its reader hands it over. Raises HippodromeError."""
+    if kind == "images":
+        return read_image_folder(options.source, options.fps)
+    if kind == "video":
+        return read_video(options.source, options.fps)
+    if kind == "odometry":
+        return read_bare_odometry(options.source, axes, options.fps, options.time_unit)
+    name, reader = READERS[kind]
+    module = optional_module(f"hippodrome.eval.exchange.readers.{name}")
+    drive: ForeignDrive = getattr(module, reader)(options.source, axes)
+    return drive
+
+
+def _size_of(drive: ForeignDrive) -> tuple[int, int] | None:
+    """Width and height of the frames as recorded; None if there is none."""
+    if not drive.frames:
+        return None
+    height, width = decode(drive.frames[0]).shape[:2]
+    return width, height
+
+
+def _calibration(options: ImportOptions, own_px: tuple[int, int] | None) -> Calibration | None:
+    """The camera's calibration for frames of this size; None if there is no file of it or there are no frames."""
+    if options.calibration is None or own_px is None:
+        return None
+    return scaled(read_calibration(options.calibration), own_px, str(options.calibration))
+
+
+def _intrinsics(
+    calibration: Calibration | None, own_px: tuple[int, int] | None, written_px: tuple[int, int]
+) -> dict[str, dict[str, Any]]:
+    """What the manifest keeps of a calibration, in pixels of the frames as written."""
+    if calibration is None or own_px is None:
+        return {}
+    across, down = written_px[0] / own_px[0], written_px[1] / own_px[1]
+    matrix = calibration.matrix
+    return {
+        "calibration": {
+            "focal_px": [round(float(matrix[0, 0] * across), 6), round(float(matrix[1, 1] * down), 6)],
+            "principal_px": [round(float(matrix[0, 2] * across), 6), round(float(matrix[1, 2] * down), 6)],
+            "undistorted": calibration.distorted,
+        }
+    }
+
+
+def _known_truth(options: ImportOptions, drive: ForeignDrive, axes: Axes, pose_t_s: FloatArray) -> Truth | None:
+    """The truth that the options name, or the layout's own; None where there is none. KITTI's poses have the frames' times."""
+    if options.truth is None:
+        return truth_of_trajectory(drive.truth) if drive.truth is not None else None
+    if options.truth.suffix.lower() == ".txt" and is_kitti_poses(options.truth):
+        return truth_of_trajectory(read_poses(options.truth, axes, pose_t_s, None))
+    return read_truth(options.truth, axes, options.network, options.truth_sigma_m)
+
+
+def _motion(
+    options: ImportOptions, drive: ForeignDrive, truth: Trajectory | None, calibration: Calibration | None
+) -> tuple[Motion, str]:
     """The self-motion, and words that say where it comes from. Raises ExchangeError if there is none."""
     given = options.odometry
     if given is None:
         if drive.motion is None:
             raise ExchangeError(
                 f"{options.source}: no self-motion in it; give --odometry FILE.csv (t_s,speed,yaw_rate), FILE.tum (poses), "
-                "or 'truth' to differentiate the truth"
+                "'truth' to differentiate the truth, or 'visual' to estimate it from the frames"
             )
-        return drive.motion, "as in the layout"
+        return drive.motion, options.source.name if options.kind == "odometry" else "as in the layout"
     if given == FROM_TRUTH:
         if truth is None:
-            raise ExchangeError(f"{options.source}: no truth to differentiate; give --odometry FILE.csv or FILE.tum")
+            raise ExchangeError(
+                f"{options.source}: no truth to differentiate; give --odometry FILE.csv or FILE.tum, or --truth FILE"
+            )
         return motion_of(truth, f"{options.source}: truth"), "the truth differentiated"
-    path = Path(given)
-    if path.suffix == ".csv":
-        return read_motion(path), f"{path.name}, speed and yaw rate"
-    return motion_of(flatten(read_poses(path, options.axes)), str(path)), f"{path.name}, poses differentiated"
+    if given == VISUAL:
+        return _seen_motion(options, drive, calibration)
+    pose_t_s = drive.pose_t_s if drive.pose_t_s is not None else np.array([frame.t_s for frame in drive.frames])
+    return read_self_motion(Path(given), options.axes or "body", pose_t_s, options.time_unit)
+
+
+def _seen_motion(options: ImportOptions, drive: ForeignDrive, calibration: Calibration | None) -> tuple[Motion, str]:
+    """Self-motion by visual odometry, with a warning of what it cannot do. Raises ExchangeError without a focal length."""
+    own_px = _size_of(drive)
+    if own_px is None:
+        raise ExchangeError(f"{options.source}: no frames to estimate self-motion from; give --odometry FILE.csv or FILE.tum")
+    fov_deg = field_of_view_deg(drive.focal_px if calibration is None else float(calibration.matrix[0, 0]), own_px[0])
+    if fov_deg is None:
+        raise ExchangeError(f"{options.source}: --odometry visual needs the camera's focal length; give --calibration FILE")
+    print(f"warning: self-motion from the frames alone supposes a level camera {options.camera_height_m:g} m above a flat road "
+          f"that it sees from 2.4 m on (field of view {fov_deg:.0f} degrees taken); turns and speeds of other cameras come out "
+          "too small: prefer wheels and a gyroscope")  # fmt: skip
+    undistort = undistorter(calibration, own_px) if calibration else (lambda frame: frame)
+    geometry = CameraGeometry(fov_deg=fov_deg, height_m=options.camera_height_m)
+    return visual_motion(drive.frames, geometry, own_px, undistort), "visual odometry of the frames"

@@ -16,6 +16,7 @@ import numpy as np
 from hippodrome.core import se2
 from hippodrome.core.localization.localizer import Localizer
 from hippodrome.core.mapping.mapper import Mapper
+from hippodrome.core.mapping.motion_mapper import MotionMapper
 from hippodrome.core.refinement.refine import refine
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import (
@@ -32,6 +33,8 @@ from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.eval.methods.method import RefineMode
 from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.proto.codec import load_map, save_map
+from hippodrome.sim.geo_start import GeoStart
+from hippodrome.sim.georeference import placed_start
 from hippodrome.sim.map_import import sumo_network
 from hippodrome.sim.network import junction_gaps, read_network
 from hippodrome.sim.recording import open_recording
@@ -109,7 +112,8 @@ def map_files(recording: Path, scenario: Path | None, out: Path) -> None:
     """``hippodrome map``: build the semi-metric map of a recording and save it. Raises HippodromeError on bad input."""
     source = open_recording(recording)
     config = _settings(scenario).mapper
-    cognitive_map, cpu_s = map_recording(source.observations(), Mapper(config))
+    mapper = Mapper(config) if source.frame_count else MotionMapper(config)
+    cognitive_map, cpu_s = map_recording(source.observations(), mapper)
     size = save_map(out, cognitive_map, {"recording": recording.name, "mapper": repr(config)})
     duration_s = source.samples.t_s[-1]
     print(f"{out}: {len(cognitive_map.t_s)} vertices, {len(cognitive_map.edges.source)} edges, {size} bytes, "
@@ -117,7 +121,7 @@ def map_files(recording: Path, scenario: Path | None, out: Path) -> None:
 
 
 def refine_files(
-    source: Path, network: Path, mode: RefineMode, start: StartPose | None, scenario: Path | None, out: Path
+    source: Path, network: Path, mode: RefineMode, start: StartPose | GeoStart | None, scenario: Path | None, out: Path
 ) -> Refinement:
     """``hippodrome refine``: refine a semi-metric map with a road network. Raises HippodromeError on bad input.
 
@@ -125,7 +129,7 @@ def refine_files(
         source: The semi-metric map.
         network: A SUMO network, ``package:...`` of one that is installed, or a map that is converted and kept beside ``out``.
         mode: Mode of the refinement.
-        start: Where the mapping drive began; mode ``paper`` needs it.
+        start: Where the mapping drive began, in the network's frame or on Earth; mode ``paper`` needs it.
         scenario: Where the refinement's settings are from; None takes the defaults.
         out: The topometric map.
     """
@@ -134,7 +138,8 @@ def refine_files(
     cognitive_map, provenance = load_map(source)
     config = replace(_settings(scenario).refine, mode=mode)
     roads = read_roads(network, out.parent)
-    refinement, cpu_s = timed(refine, cognitive_map, roads, config, start)
+    known_start = placed_start(start, network_file(network, out.parent, say=False), mode)
+    refinement, cpu_s = timed(refine, cognitive_map, roads, config, known_start)
     if not np.isfinite(refinement.cognitive_map.poses).all():
         raise HippodromeError(
             f"{source}: {len(cognitive_map.t_s)} vertices are too few to be laid on roads; drive farther, some 100 m and a corner"
@@ -158,8 +163,8 @@ def read_roads(network: Path, folder: Path) -> RoadNetwork:
     return roads
 
 
-def network_file(network: Path, folder: Path) -> Path:
-    """A road network of any kind as a SUMO network; netconvert's notes are printed.
+def network_file(network: Path, folder: Path, say: bool = True) -> Path:
+    """A road network of any kind as a SUMO network; netconvert's notes are printed, unless ``say`` is False.
 
     Args:
         network: A SUMO network, ``package:...`` of one that is installed, or an OpenStreetMap or OpenDRIVE map.
@@ -170,6 +175,8 @@ def network_file(network: Path, folder: Path) -> Path:
     """
     source = located(network, "--network")
     net_file, notes = sumo_network(source, folder)
+    if not say:
+        return net_file
     if net_file != source:
         print(f"{source}: a map to convert; its roads are in {net_file}")
     for note in notes:

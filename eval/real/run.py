@@ -22,6 +22,7 @@ from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.eval.methods.stages import map_files, network_file, read_roads, refine_files
 from hippodrome.eval.real.page import Drive, drive_page
 from hippodrome.proto.codec import load_map
+from hippodrome.sim.geo_start import GeoStart
 from hippodrome.sim.recording import MANIFEST, open_recording
 
 RECORD: Final = "run.json"
@@ -40,7 +41,7 @@ class RunOptions:
     drive: Path  # a recording, or what ``import_to`` imports
     network: Path  # SUMO, OpenStreetMap or OpenDRIVE
     out: Path
-    start: StartPose | None
+    start: StartPose | GeoStart | None
     import_to: Callable[[Path, Path], object] | None  # (recording to be made, SUMO network); None: ``drive`` is a recording
     score: Callable[[Path, Path], object]  # prints the errors of a map against a recording's truth
     asked: Mapping[str, str]

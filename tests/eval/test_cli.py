@@ -16,6 +16,7 @@ from hippodrome.eval.commands import exchange, trials
 from hippodrome.eval.commands.arguments import BAD_INPUT
 from hippodrome.eval.exchange.export import FORMATS
 from hippodrome.eval.exchange.importing import READERS
+from hippodrome.eval.exchange.readers.layouts import LAYOUTS
 from hippodrome.eval.trials.robustness.conditions import CONDITIONS
 from hippodrome.eval.trials.stress.cases import CASES
 
@@ -96,7 +97,7 @@ def test_version_is_the_packages(capsys):
 
 def test_names_in_the_help_are_those_of_the_parts():
     assert tuple(FORMATS) == exchange.EXPORTS
-    assert tuple(READERS) == exchange.IMPORTS
+    assert {layout.name for layout in LAYOUTS} == set(exchange.IMPORTS) >= set(READERS)
     assert set(get_args(Mode)) == set(trials.MODES)
     assert tuple(CONDITIONS) == trials.CONDITIONS
     assert tuple(case.name for case in CASES) == trials.CASES

@@ -42,6 +42,8 @@ class ForeignDrive:
     motion: Motion | None
     truth: Trajectory | None
     focal_px: float | None  # focal length, in pixels of the frames as recorded
+    pose_t_s: FloatArray | None = None  # (N,) times that poses without times of their own have; None: those of the frames
+    truth_lat_lon: FloatArray | None = None  # (N, 3) seconds, latitude, longitude in degrees, where the layout has fixes
 
 
 def trajectory_of(t_s: FloatArray, positions: FloatArray, quaternions_xyzw: FloatArray, axes: Axes, name: str) -> Trajectory:

@@ -16,6 +16,8 @@ from hippodrome.eval.exchange.drives.foreign import ForeignFrame
 
 MAX_IMAGE_BYTES: Final = 64 << 20
 MAX_PIXELS: Final = 64_000_000  # a hostile image can claim any size in a few bytes
+ORIENTATION: Final = 0x0112  # Exif: how the camera was held
+QUARTER_TURNS: Final = (5, 6, 7, 8)  # its values that exchange width and height
 
 
 def decode(frame: ForeignFrame) -> Frame:
@@ -26,12 +28,13 @@ def decode(frame: ForeignFrame) -> Frame:
     try:
         with Image.open(io.BytesIO(blob)) as header:  # reads no pixel
             width, height = header.size
+            turned = header.getexif().get(ORIENTATION, 1) in QUARTER_TURNS
     except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise ExchangeError(f"{frame.name}: not an image ({' '.join(str(error).split())[:80]})") from None
     if width * height > MAX_PIXELS or min(width, height) < 16:
         raise ExchangeError(f"{frame.name}: {width} x {height} pixels; at least 16 a side, at most {MAX_PIXELS} in all")
-    image: Any = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
-    if image is None or image.shape[:2] != (height, width):
+    image: Any = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)  # turns it as the camera was held
+    if image is None or image.shape[:2] not in ((height, width), (width, height) if turned else (height, width)):
         raise ExchangeError(f"{frame.name}: a damaged image")
     return np.ascontiguousarray(image[:, :, ::-1])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final
@@ -23,11 +23,28 @@ from hippodrome.sim.recording import CHUNK_FRAMES, FORMAT, MANIFEST, chunk_count
 FOV_DEG: Final = (20.0, 150.0)  # fields of view that a camera of ours can have; others are left out as unknown
 
 
-def write_frames(folder: Path, frames: Sequence[ForeignFrame], size_px: tuple[int, int] | None) -> tuple[int, int]:
-    """Write all frames, scaled to ``size_px`` where it is given; width and height of what was written.
+def write_frames(
+    folder: Path,
+    frames: Sequence[ForeignFrame],
+    size_px: tuple[int, int] | None,
+    undistort: Callable[[Frame], Frame] | None = None,
+) -> tuple[int, int]:
+    """Write all frames, freed of the lens's distortion and scaled where that is asked for.
 
-    Raises ExchangeError if a frame cannot be read or has not the size of the first.
+    Args:
+        folder: The recording.
+        frames: What to write.
+        size_px: Width and height to scale to; None: as they are.
+        undistort: Takes a frame as recorded; None: as they are.
+
+    Returns:
+        Width and height of what was written; 0, 0 if there are no frames.
+
+    Raises:
+        ExchangeError: A frame cannot be read or has not the size of the first.
     """
+    if not frames:
+        return 0, 0
     first = decode(frames[0])
     own = (first.shape[1], first.shape[0])
 
@@ -37,6 +54,8 @@ def write_frames(folder: Path, frames: Sequence[ForeignFrame], size_px: tuple[in
             width, height = image.shape[1], image.shape[0]
             if (width, height) != own:
                 raise ExchangeError(f"{frame.name}: {width} x {height} pixels, the first frame has {own[0]} x {own[1]}")
+            if undistort is not None:
+                image = undistort(image)
             if size_px is not None:
                 image = np.asarray(cv2.resize(image, size_px, interpolation=cv2.INTER_AREA), np.uint8)
             yield (image,)
@@ -52,18 +71,19 @@ def write_steps(folder: Path, samples: Samples) -> None:
 
 
 def camera_record(samples: Samples, size_px: tuple[int, int], fov_deg: float | None) -> dict[str, Any]:
-    """What the manifest says of the camera; its field of view only where it is known."""
+    """What the manifest says of the camera: nothing if there was none, its field of view only where it is known."""
     frame_s = samples.t_s[samples.frame_steps]
+    if not len(frame_s):
+        return {}
     rate_hz = float(1.0 / np.median(np.diff(frame_s))) if len(frame_s) > 1 else 1.0
     camera: dict[str, Any] = {"width": size_px[0], "height": size_px[1], "rate_hz": round(rate_hz, 6)}
     return camera if fov_deg is None else {**camera, "fov_deg": fov_deg}
 
 
-def field_of_view_deg(focal_px: float | None, first: ForeignFrame) -> float | None:
-    """Horizontal field of view from the focal length, which is in pixels of the frames as recorded; None if it is unknown."""
+def field_of_view_deg(focal_px: float | None, width_px: int) -> float | None:
+    """Horizontal field of view from the focal length, in pixels of frames of this width; None if it is unknown or unusual."""
     if not focal_px or focal_px <= 0.0:
         return None
-    width_px = decode(first).shape[1]
     fov_deg = float(np.degrees(2.0 * np.arctan(0.5 * width_px / focal_px)))
     return fov_deg if FOV_DEG[0] <= fov_deg <= FOV_DEG[1] else None
 

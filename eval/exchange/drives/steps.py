@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.eval.exchange.drives.clock import disjoint
 from hippodrome.eval.exchange.drives.errors import ExchangeError
-from hippodrome.eval.exchange.drives.foreign import ForeignFrame, Motion, require_increasing, truth_at
+from hippodrome.eval.exchange.drives.foreign import ForeignFrame, Motion, truth_at
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import MAX_STEPS
 
@@ -19,22 +20,21 @@ SAME_TIME_S: Final = 1e-4  # a frame and a row of self-motion closer than this a
 
 
 def begin_s(motion: Motion) -> float:
-    """When the first row of self-motion began, which no row says: it is taken to last as long as the second."""
-    return float(motion.t_s[0] - (motion.t_s[1] - motion.t_s[0]))
+    """When the first row of self-motion began, which no row says: it is taken to last a median interval."""
+    return float(motion.t_s[0] - np.median(np.diff(motion.t_s)))
 
 
 def frames_within(frames: Sequence[ForeignFrame], motion: Motion, source: Path) -> list[ForeignFrame]:
-    """The frames within the time that the self-motion covers. Raises ExchangeError, naming ``source``, if there is none."""
+    """The frames within the time that the self-motion covers; of a drive without any frame, none.
+
+    Raises ExchangeError, naming ``source`` and both ranges, if there are frames and none of them lies in that time.
+    """
     if not frames:
-        raise ExchangeError(f"{source}: no frames")
-    require_increasing(np.array([frame.t_s for frame in frames]), f"{source}: frames")
+        return []
     begins_s = begin_s(motion)
     found = [frame for frame in frames if begins_s + SAME_TIME_S < frame.t_s <= motion.t_s[-1] + SAME_TIME_S]
     if not found:
-        raise ExchangeError(
-            f"{source}: no frame within the self-motion's time, {begins_s:.3f} to {motion.t_s[-1]:.3f} s; "
-            "give both the same clock"
-        )
+        raise disjoint(str(source), (frames[0].t_s, frames[-1].t_s), (begins_s, float(motion.t_s[-1])))
     return found
 
 

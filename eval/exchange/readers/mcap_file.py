@@ -23,7 +23,7 @@ from hippodrome.eval.exchange.drives.foreign import (
     trajectory_of,
 )
 from hippodrome.eval.exchange.drives.poses import Axes
-from hippodrome.eval.exchange.readers.messages import TRUTH_TOPICS, png_of
+from hippodrome.eval.exchange.readers.messages import TRUTH_TOPICS, png_of, told, without_repeats
 from hippodrome.eval.exchange.readers.spool import Spool
 
 IMAGES = ("foxglove.CompressedImage", "foxglove.RawImage")
@@ -43,10 +43,18 @@ def read_mcap(path: Path, axes: Axes) -> ForeignDrive:
                 raise ExchangeError(f"{path}: no topic of {' or '.join(IMAGES)}; it has: {_listed(topics)}")
             odometry = next((topic for topic, kind in topics.items() if kind == ODOMETRY), None)
             truth = next((topic for topic in TRUTH_TOPICS if topics.get(topic) in (POSE, ODOMETRY)), None)
+            others = [topic for topic, kind in topics.items() if kind in IMAGES and topic != images]
+            told(path, images, others, odometry, truth)
             spool = Spool()
             frames = [_frame(path, images, stamp, message, spool) for stamp, message in _messages(stream, images)]
-            motion = _motion(path, odometry, list(_messages(stream, odometry))) if odometry else None
-            poses = _poses(path, truth, list(_messages(stream, truth)), axes) if truth else None
+            motion = (
+                _motion(path, odometry, without_repeats(list(_messages(stream, odometry)), f"{path}: {odometry}"))
+                if odometry
+                else None
+            )
+            poses = (
+                _poses(path, truth, without_repeats(list(_messages(stream, truth)), f"{path}: {truth}"), axes) if truth else None
+            )
     except OSError as error:
         raise ExchangeError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (McapError, DecodeError, struct.error, ValueError, KeyError, TypeError, MemoryError, EOFError) as error:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Final
+from pathlib import Path
+from typing import Final, TypeVar
 
 import cv2
 import numpy as np
 
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 
-CHANNELS: Final = {"rgb8": 3, "bgr8": 3, "mono8": 1}  # channels of the encodings that are known
+MessageT = TypeVar("MessageT")
+CHANNELS: Final = {"rgb8": 3, "bgr8": 3, "mono8": 1, "rgba8": 4, "bgra8": 4}  # channels of the encodings that are known
 TRUTH_TOPICS: Final = (
     "/ground_truth",
     "/groundtruth",
@@ -37,5 +39,19 @@ def png_of(data: bytes, encoding: str, width: int, height: int, step: int, name:
     if width < 1 or height < 1 or step < channels * width or len(data) < step * height:
         raise ExchangeError(f"{name}: {len(data)} bytes do not hold {width} x {height} pixels of {encoding}")
     rows = np.frombuffer(data, np.uint8, step * height).reshape(height, step)
-    image = rows[:, : channels * width].reshape(height, width, channels)
-    return cv2.imencode(".png", image[:, :, ::-1] if encoding == "rgb8" else image)[1].tobytes()
+    image = rows[:, : channels * width].reshape(height, width, channels)[:, :, :3]  # alpha is dropped
+    return cv2.imencode(".png", image[:, :, ::-1] if encoding.startswith("rgb") else image)[1].tobytes()
+
+
+def without_repeats(messages: list[tuple[int, MessageT]], name: str) -> list[tuple[int, MessageT]]:
+    """Stamped messages without those whose stamp repeats the one before; prints how many of the topic ``name`` are left out."""
+    kept = [one for number, one in enumerate(messages) if number == 0 or one[0] != messages[number - 1][0]]
+    if len(kept) < len(messages):
+        print(f"{name}: {len(messages) - len(kept)} message(s) that repeat the time of the one before are left out")
+    return kept
+
+
+def told(path: Path, images: str, others: list[str], odometry: str | None, truth: str | None) -> None:
+    """Print which topics are used, where the file has several of images."""
+    if others:
+        print(f"{path}: images of {images} (not of {', '.join(others)[:200]}), self-motion of {odometry}, truth of {truth}")

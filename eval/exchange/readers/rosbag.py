@@ -17,11 +17,12 @@ from hippodrome.eval.exchange.drives.foreign import (
     ForeignDrive,
     ForeignFrame,
     Motion,
+    motion_of,
     motion_table,
     trajectory_of,
 )
 from hippodrome.eval.exchange.drives.poses import Axes
-from hippodrome.eval.exchange.readers.messages import TRUTH_TOPICS, png_of
+from hippodrome.eval.exchange.readers.messages import TRUTH_TOPICS, png_of, told, without_repeats
 from hippodrome.eval.exchange.readers.spool import Spool
 
 COMPRESSED, RAW = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"
@@ -42,10 +43,16 @@ def read_rosbag(path: Path, axes: Axes) -> ForeignDrive:
                 raise ExchangeError(f"{path}: no topic of {COMPRESSED} or {RAW}; it has: {listed}")
             truth = next((topic for topic in TRUTH_TOPICS if topics.get(topic) in (POSE, ODOMETRY)), None)
             odometry = next((topic for topic, kind in topics.items() if kind == ODOMETRY and topic != truth), None)
+            others = [topic for topic, kind in topics.items() if kind in (COMPRESSED, RAW) and topic != images]
+            told(path, images, others, odometry, truth)
             spool = Spool()
             frames = [_frame(path, images, stamp, message, spool) for stamp, message in _messages(bag, images)]
-            motion = _motion(path, odometry, list(_messages(bag, odometry))) if odometry else None
-            poses = _poses(path, truth, list(_messages(bag, truth)), axes) if truth else None
+            motion = (
+                _motion(path, odometry, without_repeats(list(_messages(bag, odometry)), f"{path}: {odometry}"))
+                if odometry
+                else None
+            )
+            poses = _poses(path, truth, without_repeats(list(_messages(bag, truth)), f"{path}: {truth}"), axes) if truth else None
     except (AnyReaderError, OSError, struct.error, ValueError, KeyError, TypeError, IndexError, MemoryError, EOFError) as error:
         said = " ".join(str(error).split())[:120]
         raise ExchangeError(f"{path}: not a readable ROS bag ({type(error).__name__}: {said})") from None
@@ -72,6 +79,11 @@ def _motion(path: Path, topic: str, messages: list[tuple[int, Any]]) -> Motion:
     twists = [message.twist.twist for _, message in messages]
     t_s = np.array([stamp for stamp, _ in messages]) / 1e9
     speed, yaw_rate = np.array([one.linear.x for one in twists]), np.array([one.angular.z for one in twists])
+    if len(messages) > 2 and not speed.any() and not yaw_rate.any():
+        poses = _poses(path, topic, messages, "body")
+        if np.ptp(poses.poses[:, :2], axis=0).max() > 0.0:
+            print(f"{path}: {topic}: its velocities are all 0 while its poses move: the poses are differentiated")
+            return motion_of(poses, f"{path}: {topic}")
     return motion_table(t_s, speed, yaw_rate, f"{path}: {topic}")
 
 

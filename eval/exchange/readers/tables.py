@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 
 from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.eval.exchange.drives.clock import TimeUnit, in_seconds
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import (
     ForeignDrive,
@@ -21,8 +22,11 @@ from hippodrome.eval.exchange.drives.foreign import (
 from hippodrome.eval.exchange.drives.images import file_frame
 from hippodrome.eval.exchange.drives.poses import Axes, planar
 from hippodrome.eval.exchange.drives.tables import ODOMETRY
+from hippodrome.eval.exchange.readers.motion_csv import read_motion
+from hippodrome.eval.exchange.readers.pictures import image_files
 from hippodrome.eval.exchange.readers.text import inside, read_lines, read_table
 
+KITTI_CAMERAS = ("image_2", "image_0", "image_3", "image_1")
 EUROC_ODOMETRY = Path("odometry0", "data.csv")
 EUROC_TRUTH = Path("state_groundtruth_estimate0", "data.csv")
 
@@ -37,15 +41,20 @@ def read_tum_folder(folder: Path, axes: Axes) -> ForeignDrive:
 def read_kitti_sequence(folder: Path, axes: Axes) -> ForeignDrive:
     """Read a folder ``sequences/NN``: ``times.txt``, ``image_2`` or ``image_0``; the truth is ``../../poses/NN.txt``."""
     t_s = read_table(folder / "times.txt", 1)[:, 0]
-    images = next((folder / name for name in ("image_2", "image_0") if (folder / name).is_dir()), None)
+    images = next((folder / name for name in KITTI_CAMERAS if (folder / name).is_dir()), None)
     if images is None:
         raise ExchangeError(f"{folder}: no image_2 or image_0 in it; give a folder sequences/NN of the KITTI odometry layout")
-    frames = [file_frame(float(t), images / f"{number:06d}.png") for number, t in enumerate(t_s)]
+    numbered = {int(path.stem): path for path in image_files(images) if path.stem.isdigit()}
+    frames = [file_frame(float(t), numbered[number]) for number, t in enumerate(t_s) if number in numbered]
+    if not frames:
+        raise ExchangeError(f"{images}: no file NNNNNN.png or NNNNNN.jpg in it")
+    if len(frames) < len(t_s):
+        print(f"{images}: {len(t_s) - len(frames)} of {len(t_s)} frames are missing; the drive goes on without them")
     poses, truth = folder.parent.parent / "poses" / f"{folder.name}.txt", None
     if poses.exists():
         partly = folder / "truth_times.txt"
-        truth = _kitti_truth(poses, read_table(partly, 1)[:, 0] if partly.exists() else t_s, folder / "origin.txt", axes)
-    return ForeignDrive(frames, _odometry(folder / ODOMETRY), truth, _kitti_focal(folder / "calib.txt"))
+        truth = kitti_poses(poses, read_table(partly, 1)[:, 0] if partly.exists() else t_s, folder / "origin.txt", axes)
+    return ForeignDrive(frames, _odometry(folder / ODOMETRY), truth, _kitti_focal(folder / "calib.txt"), pose_t_s=t_s)
 
 
 def read_euroc_folder(folder: Path, axes: Axes) -> ForeignDrive:
@@ -69,10 +78,30 @@ def read_tum_poses(path: Path, axes: Axes) -> Trajectory:
     return trajectory_of(table[:, 0], table[:, 1:4], table[:, 4:8], axes, str(path))
 
 
-def read_motion(path: Path) -> Motion:
-    """Self-motion from a text file, ``t_s,speed,yaw_rate`` a line: seconds, units of length a second, radians a second."""
-    table = read_table(path, 3, ",", exactly=True)
-    return motion_table(table[:, 0], table[:, 1], table[:, 2], str(path))
+def read_poses(path: Path, axes: Axes, t_s: FloatArray | None, unit: TimeUnit | None) -> Trajectory:
+    """Poses of a file: TUM's 8 columns, or KITTI's 12 (a 3 x 4 matrix a line, of a camera relative to its first pose).
+
+    Args:
+        path: The file.
+        axes: Which way the moving frame of TUM poses points. KITTI's are a camera's.
+        t_s: Times (N,) that KITTI's poses have; None: nobody knows them.
+        unit: Unit of TUM's times; None recognises it.
+
+    Raises:
+        ExchangeError: It is neither, or KITTI's poses have no times, or other ones.
+    """
+    if is_kitti_poses(path):
+        if t_s is None:
+            raise ExchangeError(f"{path}: poses without times; say how many were taken a second with --fps N (KITTI: 10)")
+        return kitti_poses(path, t_s, None, "camera")
+    table = read_table(path, 8)
+    return trajectory_of(in_seconds(table[:, 0], unit, str(path)), table[:, 1:4], table[:, 4:8], axes, str(path))
+
+
+def is_kitti_poses(path: Path) -> bool:
+    """Whether the first line of data has 12 columns. Raises ExchangeError if the file cannot be read."""
+    first = next((line for line in read_lines(path) if line.strip() and not line.lstrip().startswith("#")), "")
+    return len(first.split()) == 12
 
 
 def _odometry(path: Path) -> Motion | None:
@@ -101,17 +130,17 @@ def _listed(table: Path, separator: str | None, unit_s: float, images: Path) -> 
     return frames
 
 
-def _kitti_truth(poses: Path, t_s: FloatArray, origin_file: Path, axes: Axes) -> Trajectory:
-    """True poses from the camera's poses relative to its first, 12 numbers a line.
+def kitti_poses(poses: Path, t_s: FloatArray, origin_file: Path | None, axes: Axes) -> Trajectory:
+    """Poses from the camera's poses relative to its first, 12 numbers a line.
 
     Our own exports say in ``origin_file`` where the first pose was in the road network's frame.
     """
     table = read_table(poses, 12)
     if len(table) != len(t_s):
-        raise ExchangeError(f"{poses}: {len(table)} poses for {len(t_s)} times")
+        raise ExchangeError(f"{poses}: {len(table)} poses for {len(t_s)} times; give poses of this drive, one a time")
     found = np.tile(np.eye(4), (len(table), 1, 1))
     found[:, :3] = table.reshape(-1, 3, 4)
-    if origin_file.exists():
+    if origin_file is not None and origin_file.exists():
         placed = read_table(origin_file, 4)[:4].reshape(4, 4) @ found
         return with_increasing_times(Trajectory(t_s, planar(placed[:, :3, 3], placed[:, :3, :3], "camera")), str(poses))
     return with_increasing_times(Trajectory(t_s, planar(found[:, :3, 3], found[:, :3, :3], axes, world="camera")), str(poses))

@@ -14,6 +14,7 @@ from hippodrome.core.mapping.mapper import (
     map_drive,
 )
 from hippodrome.core.mapping.memory import PlaceMemoryConfig
+from hippodrome.core.mapping.motion_mapper import MotionMapper
 from hippodrome.core.types import EdgeKind, Observation
 from hippodrome.core.views.descriptors import ViewCellConfig
 
@@ -190,3 +191,29 @@ def test_progress_hears_every_observation(drive):
     heard = []
     map_drive(drive[0][:50], CONFIG, heard.append)
     assert heard == list(range(1, 51))
+
+
+def blind_drive(count=400):
+    """A drive in a circle without any frame."""
+    return [Observation(t_s=0.1 * (i + 1), dt_s=0.1, speed=5.0, yaw_rate_radps=0.05, frame=None) for i in range(count)]
+
+
+def test_a_drive_without_frames_has_keyframes_by_its_motion_and_no_views():
+    mapper = MotionMapper()
+    for observation in blind_drive():
+        mapper.step(observation)
+    found = mapper.finish()
+    assert len(found.view_cells.templates) == 0
+    assert (found.view_cell == -1).all()
+    assert len(found.edges.source) == len(found.t_s) - 1
+    assert found.visits.motion[1:, 2] == pytest.approx(np.diff(found.t_s) * 0.05)
+
+
+def test_frames_that_come_late_begin_the_map():
+    frame = np.random.default_rng(1).integers(0, 256, (24, 32, 3), np.uint8)
+    late = blind_drive(200) + [
+        Observation(t_s=20.0 + 0.1 * (i + 1), dt_s=0.1, speed=5.0, yaw_rate_radps=0.05, frame=frame) for i in range(100)
+    ]
+    found = map_drive(late)
+    assert found.t_s[0] > 20.0
+    assert (found.view_cell >= 0).all()

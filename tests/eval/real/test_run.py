@@ -103,11 +103,6 @@ def test_a_folder_of_other_things_is_left_alone(drive, tmp_path, capsys):
     assert "holds other files than a run's" in capsys.readouterr().err
 
 
-def test_what_is_no_recording_needs_its_layout(drive, tmp_path, capsys):
-    assert main(["run", str(tmp_path), "--network", str(drive[1]), "--out", str(tmp_path / "out")]) == BAD_INPUT
-    assert "say what it is with --from" in capsys.readouterr().err
-
-
 def test_a_foreign_layout_is_imported_first(drive, tmp_path, capsys):
     named = write_drive(tmp_path / "<b>drive")
     arguments = ["run", str(named), "--from", "tum", "--network", str(drive[1]), "--out", str(tmp_path / "out")]

@@ -1,0 +1,44 @@
+"""Self-motion in a file of its own: a table of speeds, or poses to be differentiated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from hippodrome.core.types import FloatArray
+from hippodrome.eval.exchange.drives.clock import TimeUnit
+from hippodrome.eval.exchange.drives.errors import ExchangeError
+from hippodrome.eval.exchange.drives.foreign import ForeignDrive, Motion, motion_of
+from hippodrome.eval.exchange.drives.poses import Axes
+from hippodrome.eval.exchange.readers.motion_csv import read_motion
+from hippodrome.eval.exchange.readers.tables import read_poses
+from hippodrome.eval.exchange.readers.text import read_lines
+
+CSV, POSES = "speed and yaw rate", "poses differentiated"
+
+
+def read_self_motion(path: Path, axes: Axes, t_s: FloatArray | None, unit: TimeUnit | None) -> tuple[Motion, str]:
+    """The self-motion of a file, and words that say what it was made of.
+
+    Args:
+        path: A ``.csv`` of speeds and yaw rates, or TUM's or KITTI's poses.
+        axes: Which way TUM poses point.
+        t_s: Times (N,) of KITTI's poses; None: unknown.
+        unit: Unit of the file's times; None recognises it.
+
+    Raises:
+        ExchangeError: It cannot be read.
+    """
+    if path.suffix.lower() == ".csv":
+        return read_motion(path, unit), f"{path.name}, {CSV}"
+    return motion_of(read_poses(path, axes, t_s, unit), str(path)), f"{path.name}, {POSES}"
+
+
+def read_bare_odometry(path: Path, axes: Axes, fps: float | None, unit: TimeUnit | None) -> ForeignDrive:
+    """A drive without any frame: its self-motion alone. KITTI's poses are ``1 / fps`` seconds apart. Raises ExchangeError."""
+    if not path.is_file():
+        raise ExchangeError(f"{path}: no such file; give a .csv of t_s,speed,yaw_rate, a .tum of poses, or KITTI's poses")
+    t_s = None if fps is None else np.arange(sum(bool(line.strip()) for line in read_lines(path))) / fps
+    motion, _ = read_self_motion(path, axes, t_s, unit)
+    return ForeignDrive([], motion, None, None, pose_t_s=t_s)

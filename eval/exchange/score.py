@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -29,6 +29,7 @@ GAP_AT_FIXES_S = 1.0  # the estimate is interpolated over this at sparse fixes, 
 RAYLEIGH_MEAN = 1.2533  # mean distance of a planar position whose axes have a standard deviation of 1
 
 Clock = Literal["auto", "source", "recording"]
+LEAST_ORIGIN_S: Final = 1e-3  # clocks that differ by less are the same: what differs is rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +165,10 @@ def _estimate(
     origin_s = _origin_s(drive)
     if origin_s and (options.clock == "source" or (options.clock == "auto" and not poses.own)):
         poses = replace(poses, t_s=poses.t_s - origin_s)
-        sheet.note(f"{options.estimate}: taken to be in the clock of the drive's source, {origin_s:g} s before the recording's")
+        if abs(origin_s) >= LEAST_ORIGIN_S:
+            sheet.note(
+                f"{options.estimate}: taken to be in the clock of the drive's source, {origin_s:g} s before the recording's"
+            )
     fitted = not (options.network_frame and same_world)
     trajectory = flatten(poses, truth.in_space() if fitted else None)
     return trajectory, options.network_frame, _level_clause(poses, trajectory, fitted)

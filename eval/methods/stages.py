@@ -137,8 +137,9 @@ def refine_files(
         raise HippodromeError("mode 'paper' begins at a known pose: give --start X,Y,HEADING, or use --mode route")
     cognitive_map, provenance = load_map(source)
     config = replace(_settings(scenario).refine, mode=mode)
-    roads = read_roads(network, out.parent)
-    known_start = placed_start(start, network_file(network, out.parent, say=False), mode)
+    net_file = network_file(network, out.parent)
+    known_start = placed_start(start, net_file, mode)
+    roads = _read_lanes(net_file)
     refinement, cpu_s = timed(refine, cognitive_map, roads, config, known_start)
     if not np.isfinite(refinement.cognitive_map.poses).all():
         raise HippodromeError(
@@ -156,15 +157,19 @@ def refine_files(
 
 def read_roads(network: Path, folder: Path) -> RoadNetwork:
     """The lanes of a road network of any kind; what there is to know about it is printed. As ``network_file``, and its errors."""
-    net_file = network_file(network, folder)
+    return _read_lanes(network_file(network, folder))
+
+
+def _read_lanes(net_file: Path) -> RoadNetwork:
+    """The lanes of a SUMO network; where it lacks lanes inside junctions, a note says so."""
     roads = read_network(net_file)
     for note in junction_gaps(roads, net_file):
         print(f"note: {note}")
     return roads
 
 
-def network_file(network: Path, folder: Path, say: bool = True) -> Path:
-    """A road network of any kind as a SUMO network; netconvert's notes are printed, unless ``say`` is False.
+def network_file(network: Path, folder: Path) -> Path:
+    """A road network of any kind as a SUMO network; netconvert's notes are printed.
 
     Args:
         network: A SUMO network, ``package:...`` of one that is installed, or an OpenStreetMap or OpenDRIVE map.
@@ -175,8 +180,6 @@ def network_file(network: Path, folder: Path, say: bool = True) -> Path:
     """
     source = located(network, "--network")
     net_file, notes = sumo_network(source, folder)
-    if not say:
-        return net_file
     if net_file != source:
         print(f"{source}: a map to convert; its roads are in {net_file}")
     for note in notes:

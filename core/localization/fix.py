@@ -37,8 +37,9 @@ is a fix for good.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,15 +58,21 @@ class Relation(Enum):
     NEITHER = 3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fix:
-    """What is known about the believed place. Evidence is a sum of margins."""
+NO_COVARIANCE: FloatArray = np.zeros((3, 3))
+NO_COVARIANCE.setflags(write=False)  # one array for every new fix
+
+
+class Fix(NamedTuple):
+    """What is known about the believed place. Evidence is a sum of margins.
+
+    A named tuple, since three new ones are made for every query frame, and those are made faster than dataclasses.
+    """
 
     adopted: bool = False  # whether a pose was adopted: from then on there is an incumbent
     total: float = 0.0  # evidence of all views so far; only for beliefs without a challenger
     support: float = 0.0  # evidence of the incumbent, as far as remembered
     challenge: float = 0.0  # evidence of the challenger, as far as remembered
-    map_covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))  # of the map where a view was recognised last
+    map_covariance: FloatArray = NO_COVARIANCE  # (3, 3) of the map where a view was recognised last
     sq_lateral_m2: float = 0.0  # squared disagreement of views with the belief across the road, a running mean
     place_z: float | None = None  # z-score of the believed place in the frames, a running mean; None: not seen since adopted
     on_map: bool = True  # whether cells of the map lie around the believed place
@@ -99,7 +106,7 @@ class PlaceCheck:
 
 def faded(fix: Fix, config: LocalizerConfig) -> Fix:
     """Discount the evidence for incumbent and challenger, once for each query frame."""
-    return replace(fix, support=config.evidence_memory * fix.support, challenge=config.evidence_memory * fix.challenge)
+    return fix._replace(support=config.evidence_memory * fix.support, challenge=config.evidence_memory * fix.challenge)
 
 
 def recognised(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
@@ -109,14 +116,14 @@ def recognised(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
     """
     if view.relation is Relation.ALL_HYPOTHESES:
         total = fix.total + view.margin
-        return replace(fix, adopted=total >= config.fix_evidence, total=total, map_covariance=view.map_covariance)
+        return fix._replace(adopted=total >= config.fix_evidence, total=total, map_covariance=view.map_covariance)
     if view.relation is Relation.INCUMBENT:
         return _supported(fix, view, config)
     if challenger_wins(fix, view, config):
         return _adopted(fix, view, config)
     if view.relation is Relation.CHALLENGER:
-        return replace(fix, challenge=fix.challenge + view.evidence)
-    return replace(fix, challenge=view.evidence)
+        return fix._replace(challenge=fix.challenge + view.evidence)
+    return fix._replace(challenge=view.evidence)
 
 
 def challenger_wins(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> bool:
@@ -130,8 +137,7 @@ def _supported(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
     The incumbent's evidence is bounded by ``fix_evidence``, as otherwise no challenger could ever gather more. The squared
     lateral disagreement of the view goes into a running mean, which later becomes part of the reported covariance.
     """
-    return replace(
-        fix,
+    return fix._replace(
         support=min(fix.support + view.evidence, config.fix_evidence),
         challenge=0.0,
         map_covariance=view.map_covariance,
@@ -145,8 +151,7 @@ def _adopted(fix: Fix, view: RecognisedView, config: LocalizerConfig) -> Fix:
 
     The z-score of the believed place is forgotten, as no frame has been compared with the new place yet.
     """
-    return replace(
-        fix,
+    return fix._replace(
         adopted=True,
         support=min(fix.challenge + view.evidence, config.fix_evidence),
         challenge=0.0,
@@ -163,8 +168,7 @@ def checked(fix: Fix, check: PlaceCheck, config: LocalizerConfig) -> Fix:
     is remembered until a view agrees again. The z-score is averaged over frames, as a single frame may be hidden by a lorry.
     """
     on_map = check.on_map or fix.place_z is None
-    return replace(
-        fix,
+    return fix._replace(
         on_map=on_map,
         off_roads=fix.off_roads or (not on_map and not check.may_be_on_road),
         place_z=_running_mean(fix.place_z, check.z_score, config.seen_memory),

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from hippodrome.core.localization import gyro
+from hippodrome.core.localization.beliefs.belief import competes
 from hippodrome.core.localization.beliefs.motion import Motion, PoseMeasurement
 from hippodrome.core.localization.beliefs.start import start_belief
 from hippodrome.core.localization.competition import relation_of, updated
@@ -159,10 +160,11 @@ class Localizer:
         ``weight`` (0 to 1) discounts a frame that was taken close to the one before it, since the two show nearly the same.
         """
         config, belief, gate = self._config, self._belief, self._config.injection.gate
-        relation = relation_of(measurement, belief, self._fix.adopted, gate)
+        sq_distance = belief.sq_distance(measurement) if self._fix.adopted and competes(belief) else None
+        relation = relation_of(measurement, belief, self._fix.adopted, gate, sq_distance)
         sq_lateral_m2 = _sq_lateral_m2(belief.pose, measurement.pose)
         view = RecognisedView(relation, match.margin, weight, self._places.map_covariance[match.cell], sq_lateral_m2)
-        self._belief = updated(belief, measurement, relation, challenger_wins(self._fix, view, config), gate)
+        self._belief = updated(belief, measurement, relation, challenger_wins(self._fix, view, config), gate, sq_distance)
         self._fix = recognised(self._fix, view, config)
 
     def _place_check(self, match: PlaceMatch, believed: IntArray) -> PlaceCheck:

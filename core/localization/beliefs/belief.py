@@ -7,8 +7,7 @@ to hold measurements that conflict with it; it takes over by ``adopt``. Beliefs 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol, Self, TypeGuard
+from typing import NamedTuple, Protocol, Self, TypeGuard
 
 import numpy as np
 
@@ -18,8 +17,7 @@ from hippodrome.core.localization.beliefs.motion import Motion, PoseMeasurement
 from hippodrome.core.types import FloatArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NetworkActivity:
+class NetworkActivity(NamedTuple):
     """State of the attractor networks as estimates report it. M grid modules; populations: integrator, calibration."""
 
     head_direction_rad: FloatArray  # (2,)

@@ -73,7 +73,7 @@ def test_old_evidence_fades():
 
 
 def test_localized_is_doubted_when_a_challenger_has_more_than_the_incumbent_until_it_fades():
-    fix = seen(replace(LOCALIZED, support=1.0), view(Relation.NEITHER, margin=2.0))
+    fix = seen(LOCALIZED._replace(support=1.0), view(Relation.NEITHER, margin=2.0))
     assert status_of(fix) is LocalizationStatus.DOUBTED
     assert status_of(faded(fix, CONFIG)) is LocalizationStatus.LOCALIZED  # 1.2 is less than 1.5
     assert status_of(seen(LOCALIZED, view(Relation.NEITHER, margin=3.9))) is LocalizationStatus.LOCALIZED  # support holds
@@ -107,9 +107,9 @@ def test_a_place_that_is_not_what_is_seen_is_doubted_until_it_is_seen_again():
 
 
 def test_the_first_frame_after_a_fix_counts_in_full_and_frames_that_do_not_score_the_place_not_at_all():
-    assert checked(replace(LOCALIZED, place_z=None), PlaceCheck(True, True, 3.0), CONFIG).place_z == 3.0
+    assert checked(LOCALIZED._replace(place_z=None), PlaceCheck(True, True, 3.0), CONFIG).place_z == 3.0
     assert checked(LOCALIZED, PlaceCheck(True, True, None), CONFIG).place_z == 6.0
-    assert checked(replace(LOCALIZED, place_z=None), PlaceCheck(True, True, None), CONFIG).place_z is None
+    assert checked(LOCALIZED._replace(place_z=None), PlaceCheck(True, True, None), CONFIG).place_z is None
 
 
 def test_localized_and_off_map_follow_the_mapped_roads():
@@ -119,7 +119,7 @@ def test_localized_and_off_map_follow_the_mapped_roads():
 
 
 def test_a_place_that_was_just_adopted_is_on_the_map():
-    fix = checked(replace(LOCALIZED, place_z=None), FIELD, CONFIG)
+    fix = checked(LOCALIZED._replace(place_z=None), FIELD, CONFIG)
     assert (fix.on_map, fix.off_roads) == (True, False)
 
 

@@ -65,8 +65,8 @@ def updated(
 def _bounded(measurement: PoseMeasurement, sq_distance: float, gate: float) -> PoseMeasurement:
     """Grow the covariance of a measurement beyond the gate, so that an outlier moves the incumbent only a little.
 
-    ``sq_distance`` is the squared Mahalanobis distance of the measurement from the incumbent. The covariance grows by its ratio to
-    ``gate``. The weight of the measurement therefore falls with the squared distance, as under a Student-t likelihood.
+    ``sq_distance`` is the squared Mahalanobis distance of the measurement from the incumbent. The covariance grows by its ratio
+    to ``gate``. The weight of the measurement therefore falls with the squared distance, as under a Student-t likelihood.
     """
     excess = max(1.0, sq_distance / gate)
     covariance: FloatArray = excess * measurement.covariance

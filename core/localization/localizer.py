@@ -155,8 +155,10 @@ class Localizer:
         return PoseMeasurement(pose, turn @ np.diag([along_m**2, noise.across_m**2, noise.heading_rad**2]) @ turn.T)
 
     def _take(self, measurement: PoseMeasurement, match: PlaceMatch, weight: float) -> None:
-        """Update the belief with a measured pose, and the fix with the evidence for it.
+        """Update the belief with a measured pose, and ``_fix``, the evidence about the believed place, with the view's.
 
+        If the belief can hold a challenger, a pose that agrees with the incumbent or the challenger updates that one; a pose
+        that conflicts becomes the challenger. ``match`` gives the margin of the view and the cell, and so the map's error there.
         ``weight`` (0 to 1) discounts a frame that was taken close to the one before it, since the two show nearly the same.
         """
         config, belief, gate = self._config, self._belief, self._config.injection.gate

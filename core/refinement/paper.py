@@ -146,11 +146,15 @@ def bend_onto_roads(poses: FloatArray, edges: Edges, geometry: RoadGeometry, con
 
 
 def _stretch(poses: FloatArray, edges: Edges) -> float:
-    """Length of the odometry edges between the poses over their length as measured; 1 where nothing was driven."""
+    """Factor by which the optimised poses (V, 3) have stretched the measured odometry; 1 where nothing was driven.
+
+    It is the summed length of the odometry edges between the poses, over the summed length as measured. ``bend_onto_roads``
+    rescales what follows the window by it.
+    """
     odometry = edges_where(edges, edges.kind == EdgeKind.ODOMETRY)
-    driven_m = np.linalg.norm(poses[odometry.target, :2] - poses[odometry.source, :2], axis=1).sum()
+    optimised_m = np.linalg.norm(poses[odometry.target, :2] - poses[odometry.source, :2], axis=1).sum()
     measured_m = np.linalg.norm(odometry.motion[:, :2], axis=1).sum()
-    return float(driven_m / measured_m) if measured_m > 0.0 else 1.0
+    return float(optimised_m / measured_m) if measured_m > 0.0 else 1.0
 
 
 def _edges_within(edges: Edges, begin: int, end: int) -> Edges:

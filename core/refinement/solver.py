@@ -159,11 +159,14 @@ def estimate_noise(
     scale_step_variance: FloatArray,
     factor: ChainFactor,
 ) -> tuple[Noise, FloatArray]:
-    """The noise as estimated from the residuals, and the posterior variance (S - 1,) of each step of the log scale.
+    """The noise re-estimated from the residuals, and the posterior variance (S - 1,) of each step of the log scale.
 
-    Variances are the squared whitened residuals per degree of freedom that the solution has left (``variance_factors``). The
-    variance J Sigma J^T of a predicted residual, with Sigma from ``factor``, is the share of a degree of freedom that was used
-    up. For a step of the scale, without its robust weight and times the prior variance, it is the step's posterior variance.
+    Each variance of odometry and road is multiplied by its sum of squared whitened residuals over the degrees of freedom that
+    are left (``variance_factors``). A residual uses up the share J Sigma J^T of one, its variance as predicted by the solution,
+    with Sigma from ``factor``. Closures may be false, so that their noise follows from a median without robust weights.
+
+    For a step of the log scale, J Sigma J^T over its robust weight and times its prior variance is its posterior variance. The
+    next round adds it to the squared step when it sets the robust weight (``odometry_factors``).
     """
     odometry, road, closing = all_factors(state, visits, closures, targets, noise, scale_step_variance)
     own, next_ = marginals(factor)

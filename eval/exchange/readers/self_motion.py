@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from hippodrome.core.types import FloatArray
-from hippodrome.eval.exchange.drives.clock import TimeUnit
+from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.eval.exchange.drives.clock import TimeUnit, unit_of
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignDrive, Motion, motion_of
 from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.readers.motion_csv import read_motion
-from hippodrome.eval.exchange.readers.tables import read_poses
-from hippodrome.eval.exchange.readers.text import read_lines
+from hippodrome.eval.exchange.readers.tables import is_kitti_poses, read_poses
+from hippodrome.eval.exchange.readers.text import read_lines, read_table
+from hippodrome.eval.files import spatial
+from hippodrome.eval.files.spatial import flatten
 
 CSV, POSES = "speed and yaw rate", "poses differentiated"
 
@@ -32,7 +34,14 @@ def read_self_motion(path: Path, axes: Axes, t_s: FloatArray | None, unit: TimeU
     """
     if path.suffix.lower() == ".csv":
         return read_motion(path, unit), f"{path.name}, {CSV}"
-    return motion_of(read_poses(path, axes, t_s, unit), str(path)), f"{path.name}, {POSES}"
+    return motion_of(_level_poses(path, axes, t_s, unit), str(path)), f"{path.name}, {POSES}"
+
+
+def _level_poses(path: Path, axes: Axes, t_s: FloatArray | None, unit: TimeUnit | None) -> Trajectory:
+    """Planar poses of a file. TUM's in seconds are turned level, and refused if attitudes and motion contradict each other."""
+    if is_kitti_poses(path) or (unit or unit_of(read_table(path, 8)[:, 0])) != "s":
+        return read_poses(path, axes, t_s, unit)
+    return flatten(spatial.read_poses(path, axes))
 
 
 def read_bare_odometry(path: Path, axes: Axes, fps: float | None, unit: TimeUnit | None) -> ForeignDrive:

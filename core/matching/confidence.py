@@ -6,8 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hippodrome.core.matching.search.route import Route, RouteAlternatives
-from hippodrome.core.matching.segments import consistent_with_closures, route_segments, significant_segments
+from hippodrome.core.matching.control import Control
+from hippodrome.core.matching.search.route import Route
+from hippodrome.core.matching.segments import (
+    consistent_with_closures,
+    route_segments,
+    significant_segments,
+    with_evidence,
+)
 from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.types import Edges, FloatArray, MatchBreak, MatchStatus, UInt8Array
 
@@ -18,54 +24,57 @@ class ConfidenceConfig:
 
     distant_m: float = 30.0  # an alternative route farther away than this is at another place
     least_gap_nats: float = 8.0  # lead of the route over the best alternative at another place: odds of 3,000 to 1
+    steady_scale: float = 0.125  # the log scale of a drive holds if it stays within this, three scale bins of the search
+    steady_scale_nats: float = 7.0  # what a jump costs more on such a drive: 9 of 10 odometers never jump, and it had 2 km for it
     window: int = 24  # steps (120 m) over which the score is averaged: single corners must not decide
     least_score_nats: float = -1.5  # least mean score of a step, as low as off the network; a right route has -0.1 to -0.4
-    turning_nats: float = 6.0  # log-odds for each rad that the road turns with the vehicle: 1 in 20 steps has a turn, 1 of 3 fits
-    least_evidence_nats: float = 10.0  # least log-odds of a segment in 500 m of driving; chance has up to 7, a right one 6-21
-    evidence_growth_nats: float = 6.0  # that times ln(length / 500 m) more; in 3.5 km chance has up to 15, a right one 40-300
-    least_joined_nats: float = 6.0  # least log-odds of a segment that dead reckoning joins to a certain one
+    least_evidence_nats: float = 8.0  # least evidence of a segment against its mirrored drive, which tells what chance achieves
+    least_joined_nats: float = 3.0  # the same of a segment that dead reckoning joins to a certain one
     least_votes: int = 6  # loop closures that concern a segment, from which on they may vote it down
     least_agreeing: float = 0.34  # share of them that must agree with it: 5 of 6 are false once in 600 times if 20 % are
     most_moved_m: float = 12.0  # a vertex that the refinement moves farther is ambiguous; a right search errs by up to 7 m
 
 
-def distant_gap(points_m: FloatArray, alternatives: RouteAlternatives, distant_m: float) -> FloatArray:
+def distant_gap(route: Route, config: ConfidenceConfig) -> FloatArray:
     """Lead in nats (T,), at each sample, of the best complete route over the best one that is at another place there.
 
     The gap is between complete routes, so that evidence from before and after the sample counts. If the search kept no
     alternative at another place, the lead is at least the search's margin and is returned as inf.
 
-    Args:
-        points_m: (T, 2) the best route.
-        alternatives: the alternatives at its T samples, the best route among them.
-        distant_m: alternatives farther away than this are at another place.
+    Most odometers never jump in scale. The search cannot know beforehand whether this one does; once its scale has held over the
+    whole drive, a route that needs a jump where the best one needs none is less likely by ``steady_scale_nats``.
     """
-    rows = np.diff(alternatives.row_start)
-    away = alternatives.points_m - np.repeat(points_m, rows, axis=0).astype(np.float32)
-    distant = np.where(np.sum(away**2, axis=1) > distant_m**2, alternatives.through_nats, -np.inf)
-    best = np.max(alternatives.through_nats[alternatives.row_start[-2] :])  # the best route passes through every sample
-    rival = np.maximum.reduceat(distant, alternatives.row_start[:-1])
+    found = route.alternatives
+    rows = np.diff(found.row_start)
+    away = found.points_m - np.repeat(route.points_m, rows, axis=0).astype(np.float32)
+    distant = np.where(np.sum(away**2, axis=1) > config.distant_m**2, found.through_nats, -np.inf)
+    if np.ptp(route.log_scale) <= config.steady_scale:
+        jumped = np.abs(found.log_scale - np.repeat(route.log_scale, rows)) > config.steady_scale
+        distant = distant - config.steady_scale_nats * jumped
+    best = np.max(found.through_nats[found.row_start[-2] :])  # the best route passes through every sample
+    rival = np.maximum.reduceat(distant, found.row_start[:-1])
     gap: FloatArray = np.where(rival > -1e29, best - rival, np.inf)
     return gap
 
 
-def match_status(route: Route, config: ConfidenceConfig, closures: Edges | None = None, start_known: bool = False) -> UInt8Array:
+def match_status(
+    route: Route, control: Control, config: ConfidenceConfig, closures: Edges | None = None, start_known: bool = False
+) -> UInt8Array:
     """MatchStatus (T,) of each sample of the track.
 
     Args:
         route: the matched route over T samples.
+        control: what chance achieves for parts of the same drive in the same network.
         config: the thresholds.
         closures: loop closures between visits, which vote on the segments of the route.
         start_known: whether a start pose was given.
     """
-    gap = distant_gap(route.points_m, route.alternatives, config.distant_m)
+    gap = distant_gap(route, config)
     explained = _explained(route, config)
     status = np.where(gap < config.least_gap_nats, MatchStatus.AMBIGUOUS, MatchStatus.MATCHED)
     status[~explained] = MatchStatus.OFF_NETWORK
-    segments = route_segments(route, explained, config.turning_nats)
-    growth = float(np.log(max(len(gap) / 100.0, 1.0)))  # the score that chance reaches grows with the length of the drive
-    least = config.least_evidence_nats + config.evidence_growth_nats * growth
-    kept = significant_segments(segments, least, config.least_joined_nats, start_known)
+    segments = with_evidence(route_segments(route, explained), route, control, config.least_evidence_nats)
+    kept = significant_segments(segments, config.least_evidence_nats, config.least_joined_nats, start_known)
     if closures is not None:
         kept = consistent_with_closures(kept, route, closures, config.distant_m, config.least_votes, config.least_agreeing)
     for segment in segments:

@@ -1,27 +1,19 @@
-"""Segments of the matched route, each with the log-odds that the vehicle drove there, and the votes of the loop closures.
-
-In any network some route fits a part of any drive, and straight driving fits everywhere. What chance does not bring about is that
-roads turn where the vehicle turned, in the same direction and by the same angle, one turn after the other. So each segment is
-credited for the turning that it explains and debited for the costs of its steps. The sum is a log-odds score as it is used for
-local alignments of sequences (T. F. Smith, M. S. Waterman, 1981); the score that chance reaches grows with the logarithm of the
-length (S. Karlin, S. F. Altschul, 1990), and so does the score that ``confidence`` asks for.
-"""
+"""Segments of the matched route, each with the evidence that the vehicle drove there, and the votes of the loop closures."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hippodrome.core.matching.control import Control, evidence_nats, turned_rad
 from hippodrome.core.matching.search.route import Route
-from hippodrome.core.matching.search.track import Track
 from hippodrome.core.roads.network import BoolArray
-from hippodrome.core.types import Edges, FloatArray
+from hippodrome.core.types import Edges
 
-_HALF_CHORD = 3  # steps (15 m) either side of a sample over which turning is measured: the length of a turn at a crossing
-_STRAIGHT_RAD = 0.15  # less turning over that chord may be a poor gyro's noise, a lane change or a kink of the lane
-_TURN_RAD = 0.5 * np.pi  # turning over that chord counts up to a right angle: U-turns do not count more
 _JUMP = 0.3  # a jump of the log scale by this much is either a rare restart of the odometry or a wrong turning of the route
+_SHORT_GAP = 8  # steps (40 m) off the network, over which dead reckoning errs by 10 m at most (``off_network``)
+_MOST_CONTROLS = 6  # segments, those that turn most, for which a control is searched: it bounds the time for a wrong network
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,58 +22,70 @@ class RouteSegment:
 
     first: int
     end: int
-    log_odds_nats: float  # that the vehicle drove there, against chance
+    evidence_nats: float = 0.0  # that the vehicle drove there, against chance
 
 
-def route_segments(route: Route, explained: BoolArray, nats_per_rad: float) -> list[RouteSegment]:
-    """Cut the route into segments, and sum up the log-odds of each.
+def route_segments(route: Route, explained: BoolArray) -> list[RouteSegment]:
+    """Cut the route into segments, still without evidence.
 
     Args:
         route: the matched route over T samples.
         explained: (T,) samples at which the route explains the drive; segments are runs of these, cut where the scale jumps.
-        nats_per_rad: credit for each radian that the road turns with the vehicle.
     """
     jumped = np.abs(np.diff(route.log_scale, prepend=route.log_scale[0])) > _JUMP
     begins = np.diff(explained.astype(np.int8), prepend=0) != 0
     cuts = np.flatnonzero(begins | (jumped & explained))
     ends = np.append(cuts[1:], len(explained))
-    step_nats = route.score_nats * ~(begins | jumped)  # the step that leads into a segment does not count against it
-    gain = step_nats + nats_per_rad * turning_rad(route.track)
+    return [RouteSegment(int(first), int(end)) for first, end in zip(cuts, ends, strict=True) if explained[first]]
+
+
+def with_evidence(segments: list[RouteSegment], route: Route, control: Control, enough_nats: float) -> list[RouteSegment]:
+    """The segments with the evidence for each, which is cut off at ``enough_nats``.
+
+    A segment is the best part of a route, chosen after the fact from all of the drive. The more of the drive there was to choose
+    from, the more evidence chance finds: ln(length of the drive / length of the segment) is taken off for the choice of its first
+    sample, and as much for that of its last.
+    """
+    turned = np.array([turned_rad(route.track, segment.first, segment.end) for segment in segments])
+    tried = set(np.argsort(-turned, kind="stable")[:_MOST_CONTROLS].tolist())
     return [
-        RouteSegment(int(first), int(end), float(np.sum(gain[first:end])))
-        for first, end in zip(cuts, ends, strict=True)
-        if explained[first]
+        replace(segment, evidence_nats=_chosen_evidence_nats(segment, route, control, enough_nats)) if i in tried else segment
+        for i, segment in enumerate(segments)
     ]
 
 
-def turning_rad(track: Track) -> FloatArray:
-    """How much the vehicle turns at each sample (T,), in rad: the evidence for a route that turns likewise.
-
-    The change of heading over a chord around the sample, up to a right angle and less what may be noise, is divided by the number
-    of steps in the chord, so that the samples of a turn add up to the turn.
-    """
-    index = np.arange(len(track.heading_rad))
-    behind, ahead = np.maximum(index - _HALF_CHORD, 0), np.minimum(index + _HALF_CHORD, len(index) - 1)
-    turned = np.minimum(np.abs(track.heading_rad[ahead] - track.heading_rad[behind]), _TURN_RAD)
-    per_sample: FloatArray = np.maximum(turned - _STRAIGHT_RAD, 0.0) / (2 * _HALF_CHORD)
-    return per_sample
+def _chosen_evidence_nats(segment: RouteSegment, route: Route, control: Control, enough_nats: float) -> float:
+    """The evidence for a segment, less what the choice of the segment accounts for."""
+    choice_nats = 2.0 * float(np.log(len(route.lane) / (segment.end - segment.first)))
+    return evidence_nats(route, segment.first, segment.end, control, enough_nats + choice_nats) - choice_nats
 
 
 def significant_segments(
     segments: list[RouteSegment], least_nats: float, least_joined_nats: float, start_known: bool
 ) -> list[RouteSegment]:
-    """The segments whose log-odds are too high to be due to chance.
+    """The segments whose evidence is too high to be due to chance.
 
-    Once one segment is certain, dead reckoning ties the others to it, so that less evidence suffices for them.
+    Once one segment is certain, dead reckoning ties the others to it, so that less evidence suffices for them. Those that only a
+    short gap parts from a kept one need none of their own: the vehicle cannot have gone elsewhere in between.
 
     Args:
-        segments: all segments of one route.
-        least_nats: log-odds from which on a segment is certain by itself.
-        least_joined_nats: log-odds that suffice for a segment once another one is certain.
+        segments: all segments of one route, in driving order.
+        least_nats: evidence from which on a segment is certain by itself.
+        least_joined_nats: evidence that suffices for a segment once another one is certain.
         start_known: whether a start pose was given; the segment at the drive's beginning is certain then.
     """
-    certain = [s for s in segments if s.log_odds_nats >= least_nats or (start_known and s.first == 0)]
-    return [s for s in segments if s in certain or (certain and s.log_odds_nats >= least_joined_nats)]
+    certain = [s.evidence_nats >= least_nats or (start_known and s.first == 0) for s in segments]
+    kept = [sure or (any(certain) and s.evidence_nats >= least_joined_nats) for s, sure in zip(segments, certain, strict=True)]
+    for order in (range(1, len(segments)), range(len(segments) - 2, -1, -1)):
+        for i in order:
+            neighbour = i - 1 if order.step > 0 else i + 1
+            kept[i] = kept[i] or (kept[neighbour] and _parted_briefly(segments[min(i, neighbour)], segments[max(i, neighbour)]))
+    return [segment for segment, keep in zip(segments, kept, strict=True) if keep]
+
+
+def _parted_briefly(before: RouteSegment, after: RouteSegment) -> bool:
+    """Whether the vehicle was off the network between two segments, but not for long. A jump in scale parts them for good."""
+    return 0 < after.first - before.end <= _SHORT_GAP
 
 
 def consistent_with_closures(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from hippodrome.core.refinement.residuals import Factors, State, normal_equations
+from hippodrome.core.refinement.residuals import BinaryFactors, Factors, State, normal_equations
 from hippodrome.core.solvers.chain import factorise, marginals
 from hippodrome.core.types import Edges, FloatArray
 
@@ -17,21 +18,31 @@ HEADING_SIGMA_RAD = 0.01  # a wander of 0.1 m over some 60 m
 
 
 def posterior_covariance(state: State, factors: Factors, closures: Edges) -> FloatArray:
-    """Covariance (S, 4, 4) of each keyframe's unknowns, closures included, in linear time.
+    """Covariance (S, B, B) of each keyframe's B unknowns, closures included, in linear time.
 
     The marginals of the chain alone would take the far end of a closure as known, whereas it is as uncertain as the near one.
     With J and K the closure's whitened Jacobians of its near and its far end, and P the far end's covariance without any closure,
     a closure informs its near end by J^T (1 + K P K^T)^-1 J. What several closures of one place have in common is neglected.
     """
-    closing = factors.closures
-    silent = replace(closing, residual=0.0 * closing.residual, source=0.0 * closing.source, target=0.0 * closing.target)
-    alone = marginals(factorise(normal_equations(state, factors._replace(closures=silent), closures)))[0]
-    loosened = replace(
-        closing,
-        source=_near_end(closing.source, closing.target, alone[closures.target]),
-        target=_near_end(closing.target, closing.source, alone[closures.source]),
-    )
-    return marginals(factorise(normal_equations(state, factors._replace(closures=loosened), closures)))[0]
+    silent = _with_closures(factors, lambda closing: replace(closing, source=0.0 * closing.source, target=0.0 * closing.target))
+    alone = marginals(factorise(normal_equations(state, silent, closures)))[0]
+
+    def loosened(closing: BinaryFactors) -> BinaryFactors:
+        return replace(
+            closing,
+            source=_near_end(closing.source, closing.target, alone[closures.target]),
+            target=_near_end(closing.target, closing.source, alone[closures.source]),
+        )
+
+    return marginals(factorise(normal_equations(state, _with_closures(factors, loosened), closures)))[0]
+
+
+def _with_closures(factors: Factors, changed: Callable[[BinaryFactors], BinaryFactors]) -> Factors:
+    """The factors with all those along closures changed: of the poses and, where it is modelled, of the map's error."""
+    map_error = factors.map_error
+    if map_error is not None:
+        map_error = map_error._replace(closures=changed(map_error.closures))
+    return factors._replace(closures=changed(factors.closures), map_error=map_error)
 
 
 def _near_end(near: FloatArray, far: FloatArray, far_covariance: FloatArray) -> FloatArray:
@@ -50,12 +61,14 @@ def _near_end(near: FloatArray, far: FloatArray, far_covariance: FloatArray) -> 
     return whitened
 
 
-def with_systematic_errors(covariance: FloatArray, survey_sigma_m: float) -> FloatArray:
-    """The formal covariance (S, 4, 4) plus the errors that do not average out along a lane.
+def with_systematic_errors(covariance: FloatArray) -> FloatArray:
+    """The formal covariance (S, B, B) plus the errors that do not average out along a lane.
 
-    These are the distance between the lane as driven and as drawn, and the network's own error, with a standard deviation of
-    ``survey_sigma_m``. Both are errors across the lane, but in bends an error across the lane is one along it too, so that they
-    are added to both axes.
+    This is the distance between the lane as driven and as drawn. It is an error across the lane, but in bends an error across the
+    lane is one along it too, so that it is added to both axes.
     """
-    place = PLACE_SIGMA_M**2 + survey_sigma_m**2
-    return covariance + np.diag([place, place, HEADING_SIGMA_RAD**2, 0.0])
+    added = np.zeros_like(covariance[0])
+    added[0, 0] = added[1, 1] = PLACE_SIGMA_M**2
+    added[2, 2] = HEADING_SIGMA_RAD**2
+    enlarged: FloatArray = covariance + added
+    return enlarged

@@ -13,10 +13,12 @@ from typing import ClassVar
 import numpy as np
 
 from hippodrome.core.matching.confidence import ConfidenceConfig, match_breaks, match_status, reject_displaced
+from hippodrome.core.matching.control import control_of
 from hippodrome.core.matching.lane_choice import choose_lanes, near_lane_changes, on_parallel_lanes
 from hippodrome.core.matching.route_line import RouteLine, route_line
 from hippodrome.core.matching.search.config import RouteSearchConfig
-from hippodrome.core.matching.search.route import Route, search_route
+from hippodrome.core.matching.search.problem import search_problem
+from hippodrome.core.matching.search.route import Route, most_likely_drive
 from hippodrome.core.refinement.edges import edges_where
 from hippodrome.core.refinement.solver import RouteSolution, SolverConfig, refine_along_route
 from hippodrome.core.roads.network import RoadNetwork
@@ -54,8 +56,10 @@ def refine_route(
     to lie on any of them; the lanes are then chosen from its metric poses, and a second one holds the keyframes on those.
     """
     visits, closures = cognitive_map.visits, keyframe_closures(cognitive_map)
-    route = search_route(visits, network, config.search, start)
-    status = match_status(route, config.confidence, closures, start is not None)[route.track.visit_samples()]
+    problem = search_problem(visits, network, config.search)
+    route = most_likely_drive(problem, config.search, start)
+    control = control_of(problem, config.search)
+    status = match_status(route, control, config.confidence, closures, start is not None)[route.track.visit_samples()]
     vouched = (status != MatchStatus.OFF_NETWORK).astype(np.float64)
     log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
     line, arc = _line_and_places(route, network)

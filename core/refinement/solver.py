@@ -14,7 +14,8 @@ from hippodrome.core.matching.route_line import RouteLine
 from hippodrome.core.refinement.covariance import posterior_covariance, with_systematic_errors
 from hippodrome.core.refinement.noise import Noise, rescaled, variance_factors
 from hippodrome.core.refinement.residuals import (
-    BinaryFactors,
+    Factors,
+    MapErrorModel,
     RoadTargets,
     State,
     all_factors,
@@ -38,7 +39,8 @@ class SolverConfig:
     inner_iterations: int = 2
     reprojection_m: float = 4.0  # arc length by which a keyframe's place on the route may move in one round
     unvouched_weight: float = 1e-6  # weight of the road where nothing vouches for it: it determines a pose without pulling it
-    survey_sigma_m: float = 0.0  # sigma per axis of the road network itself; no drive shows it, so whoever knows it must say it
+    survey_sigma_m: float = 0.0  # sigma per axis of the error of the road network itself; 0: the network is exact
+    survey_length_m: float = 100.0  # correlation length of that error: neighbouring roads are drawn wrong alike
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +50,7 @@ class RouteSolution:
     state: State
     arc_m: FloatArray  # (S,) place of each keyframe on the route's line
     noise: Noise
-    covariance: FloatArray  # (S, 4, 4) x, y, heading, log scale
+    covariance: FloatArray  # (S, 4, 4) x, y, heading, log scale; (S, 6, 6) with the error of the map
 
 
 def refine_along_route(
@@ -78,20 +80,22 @@ def refine_along_route(
         config: number and constants of the rounds.
     """
     points, heading = points_on_line(line, arc_m)
-    state = State(np.column_stack([points, heading]), log_scale, np.zeros(2))
+    map_error = MapErrorModel(config.survey_sigma_m, config.survey_length_m) if config.survey_sigma_m > 0.0 else None
+    no_error_yet = None if map_error is None else np.zeros_like(points)
+    state = State(np.column_stack([points, heading]), log_scale, np.zeros(2), no_error_yet)
     noise = Noise()
     scale_step_variance = prior_scale_step_variance(state, visits, noise)
     road_weight = np.maximum(vouched, config.unvouched_weight)
     for along_sigma_m in config.along_sigma_m:
-        arc_m = reproject(line, state.poses[:, :2], arc_m, config.reprojection_m)
+        arc_m = reproject(line, state.drawn_points_m, arc_m, config.reprojection_m)
         points, heading = points_on_line(line, arc_m)
-        added_lateral_m = np.hypot(unknown_lane_sigma_m(line, arc_m, free), config.survey_sigma_m)
-        targets = RoadTargets(points, heading, curvature(line, arc_m), added_lateral_m, road_weight, along_sigma_m)
+        added_lateral_m = unknown_lane_sigma_m(line, arc_m, free)
+        targets = RoadTargets(points, heading, curvature(line, arc_m), added_lateral_m, road_weight, along_sigma_m, map_error)
         for _ in range(config.inner_iterations):
             state, factor = gauss_newton_step(state, visits, closures, targets, noise, scale_step_variance)
         noise, scale_step_variance = estimate_noise(state, visits, closures, targets, noise, scale_step_variance, factor)
     covariance = posterior_covariance(state, all_factors(state, visits, closures, targets, noise, scale_step_variance), closures)
-    return RouteSolution(state, arc_m, noise, with_systematic_errors(covariance, config.survey_sigma_m))
+    return RouteSolution(state, arc_m, noise, with_systematic_errors(covariance))
 
 
 def prior_scale_step_variance(state: State, visits: Visits, noise: Noise) -> FloatArray:
@@ -130,16 +134,18 @@ def gauss_newton_step(
     """
     factors = all_factors(state, visits, closures, targets, noise, scale_step_variance)
     system = normal_equations(state, factors, closures)
-    step, gyro_step, factor = solve_coupled(system, _closure_coupling(factors.closures, closures), tolerance, MOST_CG_STEPS)
+    step, gyro_step, factor = solve_coupled(system, _closure_coupling(factors, closures), tolerance, MOST_CG_STEPS)
     return stepped(state, step, gyro_step), factor
 
 
-def _closure_coupling(factors: BinaryFactors, closures: Edges) -> Callable[[FloatArray], FloatArray]:
-    """The product x -> K x (S, 4) by which ``chain.solve_coupled`` takes the closures into account.
+def _closure_coupling(factors: Factors, closures: Edges) -> Callable[[FloatArray], FloatArray]:
+    """The product x -> K x (S, B) by which ``chain.solve_coupled`` takes the closures into account.
 
     K consists of the blocks J_a^T J_b and J_b^T J_a of each closure from a to b, which lie off the block-tridiagonal chain.
     """
-    cross = np.einsum("nmi,nmj->nij", factors.source, factors.target)
+    cross = np.einsum("nmi,nmj->nij", factors.closures.source, factors.closures.target)
+    if factors.map_error is not None:
+        cross += np.einsum("nmi,nmj->nij", factors.map_error.closures.source, factors.map_error.closures.target)
 
     def couple(x: FloatArray) -> FloatArray:
         product = np.zeros_like(x)
@@ -168,7 +174,7 @@ def estimate_noise(
     For a step of the log scale, J Sigma J^T over its robust weight and times its prior variance is its posterior variance. The
     next round adds it to the squared step when it sets the robust weight (``odometry_factors``).
     """
-    odometry, road, closing = all_factors(state, visits, closures, targets, noise, scale_step_variance)
+    odometry, road, closing, _ = all_factors(state, visits, closures, targets, noise, scale_step_variance)
     own, next_ = marginals(factor)
     joint = np.block([[own[:-1], next_], [np.swapaxes(next_, 1, 2), own[1:]]])
     jacobian = np.concatenate([odometry.source, odometry.target], axis=2)

@@ -40,6 +40,7 @@ class BeamLimits(NamedTuple):
     most_survivors: int  # about how many may survive a step
     enough_survivors: int  # the pass ends early once no more than these are left
     most_rows: int  # the pass ends early once this many hypotheses have survived, all steps together
+    least_nats: float  # a hypothesis with a lower score is dropped, however good the others are
 
 
 class Survivors(NamedTuple):
@@ -56,6 +57,7 @@ class Alternatives(NamedTuple):
     row_start: NDArray[np.int64]  # (T + 1,)
     points_m: Float32Array  # (rows, 2)
     through_nats: Float32Array  # (rows,) score of the best complete route through this place, less that of the best of all
+    scale_bin: IntArray  # (rows,)
 
 
 class _Scratch(NamedTuple):
@@ -104,7 +106,8 @@ def forward(drive: Drive, model: SearchModel, limits: BeamLimits, initial: Hypot
         size, place_count, best = step_off_network(
             rows, places, filled, best, limits.beam_nats, observation, model, scratch.index_of_lane
         )
-        row_start[t + 1] = end + _keep_best(rows[end:size], best - limits.beam_nats, limits.most_survivors)
+        least_nats = max(best - limits.beam_nats, limits.least_nats)
+        row_start[t + 1] = end + _keep_best(rows[end:size], least_nats, limits.most_survivors)
         if row_start[t + 1] - end <= limits.enough_survivors or row_start[t + 1] >= limits.most_rows:
             samples = t + 1 if row_start[t + 1] > end else t
             break
@@ -289,16 +292,16 @@ def alternatives(survivors: Survivors, through: Float32Array, points_m: FloatArr
     for t in range(times):
         kept_start[t + 1] = _keep_best_of_cells(survivors, through, t, cell, kept, kept_start[t], kept_of_cell)
     size = kept_start[times]
-    points, values = np.empty((size, 2), np.float32), np.empty(size, np.float32)
+    points, values, scale_bin = np.empty((size, 2), np.float32), np.empty(size, np.float32), np.empty(size, np.int32)
     for j in range(size):
         row = rows[kept[j]]
-        values[j] = through[kept[j]]
+        values[j], scale_bin[j] = through[kept[j]], row.scale_bin
         if row.bin >= 0:
             points[j, 0], points[j, 1] = points_m[row.bin, 0], points_m[row.bin, 1]
         else:
             place = survivors.places[-1 - row.bin]
             points[j, 0], points[j, 1] = place.x_m, place.y_m
-    return Alternatives(kept_start, points, values)
+    return Alternatives(kept_start, points, values, scale_bin)
 
 
 @njit(cache=True, error_model="numpy")

@@ -7,13 +7,14 @@ alignment", 1997. The answer is that of one search over the whole drive; a drive
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from hippodrome.core.matching.search.beam import Alternatives, BeamLimits, Survivors, alternatives, backward, forward
 from hippodrome.core.matching.search.config import RouteSearchConfig
-from hippodrome.core.matching.search.hypotheses import Hypotheses
+from hippodrome.core.matching.search.hypotheses import NOWHERE, Hypotheses
 from hippodrome.core.matching.search.model import Drive, SearchModel
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, compiled_drive, compiled_model
 from hippodrome.core.types import Float32Array, FloatArray, IntArray
@@ -42,8 +43,9 @@ class _Section(NamedTuple):
 
 
 def forward_pass(
-    drive: Drive, model: SearchModel, initial: InitialHypotheses, beam_nats: float, most: int, enough: int = 0
-) -> Survivors:
+    drive: Drive, model: SearchModel, initial: InitialHypotheses, beam_nats: float, most: int, enough: int = 0,
+    least_nats: float = NOWHERE,
+) -> Survivors:  # fmt: skip
     """Beam search over a drive, or over as much of it as fits into memory.
 
     The search ends early once at most ``enough`` hypotheses survive a step, or once ``_MAX_ROWS`` have survived all steps.
@@ -55,8 +57,9 @@ def forward_pass(
         beam_nats: a hypothesis this far behind the best one of its step is dropped.
         most: about how many hypotheses may survive a step.
         enough: the search may end once no more than these survive a step; with 0 it goes on as long as any do.
+        least_nats: a hypothesis with a lower score is dropped, however good the others are.
     """
-    limits = BeamLimits(beam_nats, most, enough, max(_MAX_ROWS, 4 * len(initial.hypotheses)))
+    limits = BeamLimits(beam_nats, most, enough, max(_MAX_ROWS, 4 * len(initial.hypotheses)), least_nats)
     survivors: Survivors = forward(drive, model, limits, *initial)
     return survivors
 
@@ -68,21 +71,47 @@ def most_likely_route(
     drive = compiled_drive(problem, problem.track.heading_rad, place_prior)
     model = compiled_model(problem)
     sections: list[_Section] = []
+    for section, survivors in _sections(drive, model, initial, config):
+        sections.append(section)
+        if section.last == len(drive.heading_rad) - 1:
+            return _backward_pass(problem, drive, model, sections, survivors, config)
+    return None
+
+
+def best_nats(
+    problem: SearchProblem, initial: InitialHypotheses, config: RouteSearchConfig, least_nats: float = NOWHERE
+) -> float:
+    """Log likelihood of the most likely route from the initial hypotheses over the whole drive, without the route itself.
+
+    It is ``NOWHERE`` if no route of the network is as long as the drive, or if it were below ``least_nats``; the search ends as
+    soon as that is certain.
+    """
+    drive, model = compiled_drive(problem, problem.track.heading_rad), compiled_model(problem)
+    for section, survivors in _sections(drive, model, initial, config, least_nats):
+        if section.last == len(drive.heading_rad) - 1:
+            return float(last_survivors(survivors).hypotheses["score_nats"].max()) + section.score_offset_nats
+    return NOWHERE
+
+
+def _sections(
+    drive: Drive, model: SearchModel, initial: InitialHypotheses, config: RouteSearchConfig, least_nats: float = NOWHERE
+) -> Iterator[tuple[_Section, Survivors]]:
+    """The sections of the forward pass in driving order, each with its survivors, up to where no hypothesis is left."""
     first, score_offset, samples = 0, 0.0, len(drive.heading_rad)
     while len(initial.hypotheses):
-        survivors = forward_pass(_samples(drive, first, samples), model, initial, config.beam_nats, config.most_survivors)
+        survivors = forward_pass(
+            _samples(drive, first, samples), model, initial, config.beam_nats, config.most_survivors,
+            least_nats=least_nats - score_offset,
+        )  # fmt: skip
         last = first + len(survivors.row_start) - 2
-        sections.append(_Section(first, last, initial, score_offset))
-        if last == samples - 1:
-            return _backward_pass(problem, drive, model, sections, survivors, config)
-        if last == first:
-            break
+        yield _Section(first, last, initial, score_offset), survivors
+        if last == first or last == samples - 1:
+            return
         initial = last_survivors(survivors)
         best = initial.hypotheses["score_nats"].max()
         best = best if best < -_EXACT_NATS else np.float32(0.0)
         initial.hypotheses["score_nats"] -= best
         first, score_offset = last, score_offset + float(best)
-    return None
 
 
 def last_survivors(survivors: Survivors) -> InitialHypotheses:
@@ -182,6 +211,7 @@ def _joined_alternatives(before: Alternatives, after: Alternatives) -> Alternati
         np.concatenate([before.row_start[:-2], after.row_start + kept]),
         np.concatenate([before.points_m[:kept], after.points_m]),
         np.concatenate([before.through_nats[:kept], after.through_nats]),
+        np.concatenate([before.scale_bin[:kept], after.scale_bin]),
     )
 
 

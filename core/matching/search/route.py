@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.passes import TracedRoute, most_likely_route
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, search_problem
-from hippodrome.core.matching.search.starts import anchor_samples, starts_near_pose, starts_without_prior
+from hippodrome.core.matching.search.starts import Start, anchor_samples, starts_near_pose, starts_without_prior
 from hippodrome.core.matching.search.track import Track
-from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.roads.network import BoolArray, RoadNetwork
 from hippodrome.core.types import Float32Array, FloatArray, HippodromeError, IntArray, StartPose, Visits
 
 _WINDOW = 24  # steps (120 m) over which the score is averaged: single corners must not decide
+_SETTLED = 200  # steps (1 km): a wrong route explains no drive for so long
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +32,7 @@ class RouteAlternatives:
     row_start: NDArray[np.int64]  # (T + 1,)
     points_m: Float32Array  # (rows, 2)
     through_nats: Float32Array  # (rows,) score of the best complete route through this place, less that of the best of all
+    log_scale: FloatArray  # (rows,) ln(metres per map unit) of that route there
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,19 +49,32 @@ class Route:
     total_nats: float  # log likelihood of the whole route
     alternatives: RouteAlternatives
 
-    def explained(self, limit_nats: float) -> bool:
-        """Whether the route is on the network throughout and no window of it costs ``limit_nats`` a step or more."""
+    def explained(self, limit_nats: float) -> BoolArray:
+        """Mask (T,) of the samples that lie on the network, in no window of which a step costs ``limit_nats`` in the mean."""
         width = min(_WINDOW, len(self.score_nats))
         mean_score = np.convolve(self.score_nats, np.full(width, 1.0 / width), "valid")
-        return bool(np.all(mean_score > -limit_nats) and np.all(self.lane >= 0))
+        bad = np.convolve(mean_score <= -limit_nats, np.ones(width), "full") > 0.5
+        mask: BoolArray = ~bad & (self.lane >= 0)
+        return mask
+
+    def settles(self, anchor: int, limit_nats: float) -> bool:
+        """Whether the route explains the whole drive, or a long part of it with the anchor inside.
+
+        A search that begins elsewhere would find nothing better.
+        """
+        unexplained = np.flatnonzero(~self.explained(limit_nats))
+        place = np.searchsorted(unexplained, anchor)
+        bounds = np.concatenate([[-1], unexplained, [len(self.lane)]])
+        around = int(bounds[place + 1] - bounds[place] - 1)
+        return around >= min(_SETTLED, len(self.lane))
 
 
 def search_route(visits: Visits, network: RoadNetwork, config: RouteSearchConfig, start: StartPose | None = None) -> Route:
     """The most likely drive through the network.
 
-    Without a start pose the search begins at an anchor, the sample of the drive that most turning follows. Should the answer
-    leave parts of the drive unexplained, other anchors are tried too (the first may lie on a road that the network lacks), and
-    the answer that explains the whole drive best is kept.
+    Without a start pose the search begins at an anchor, the sample of the drive that most turning follows. Should no place of the
+    network fit the turns after it, or should the answer leave the drive around it unexplained, other anchors are tried too (the
+    first may lie on a road that the network lacks), and the answer that explains the whole drive best is kept.
 
     Args:
         visits: the drive's raw motions, in map units.
@@ -70,14 +85,26 @@ def search_route(visits: Visits, network: RoadNetwork, config: RouteSearchConfig
     Raises:
         HippodromeError: the vehicle never moved, or no route of the network is as long as the drive.
     """
-    problem = search_problem(visits, network, config)
+    return most_likely_drive(search_problem(visits, network, config), config, start)
+
+
+def most_likely_drive(problem: SearchProblem, config: RouteSearchConfig, start: StartPose | None = None) -> Route:
+    """As ``search_route``, for a problem that is set up already."""
     if start is not None:
         return best_route(problem, starts_near_pose(problem, start, config), config)
     routes: list[Route] = []
+    poor: list[Start] = []
     for anchor in anchor_samples(problem.track, config.anchors):
-        routes.append(best_route(problem, starts_without_prior(problem, anchor, config), config))
-        if routes[-1].explained(config.off_network.step_nats):
+        start_there = starts_without_prior(problem, anchor, config)
+        if start_there.step_nats < -config.good_start_nats:
+            poor.append(start_there)
+            continue
+        routes.append(best_route(problem, start_there.initial, config))
+        if routes[-1].settles(anchor, config.off_network.step_nats):
             break
+    if not routes:
+        best_start = max(poor, key=lambda candidate: candidate.step_nats)
+        routes.append(best_route(problem, best_start.initial, config))
     return max(routes, key=lambda route: route.total_nats)
 
 
@@ -119,5 +146,11 @@ def _route(problem: SearchProblem, traced: TracedRoute) -> Route:
         heading_offset_rad=hypotheses["heading_offset_rad"].astype(np.float64),
         score_nats=np.diff(traced.score_nats, prepend=0.0),
         total_nats=float(traced.score_nats[-1]),
-        alternatives=RouteAlternatives(*traced.alternatives),
+        alternatives=_alternatives(problem, traced),
     )
+
+
+def _alternatives(problem: SearchProblem, traced: TracedRoute) -> RouteAlternatives:
+    """The alternatives with their scales in place of the scales' numbers."""
+    found = traced.alternatives
+    return RouteAlternatives(found.row_start, found.points_m, found.through_nats, problem.log_scale[found.scale_bin])

@@ -2,12 +2,13 @@
 
 If nothing is known, a coarse search begins in all bins at an *anchor*, a sample of the drive that much turning follows, as turns
 tell roads apart. It goes over a short part of the drive only. The hypotheses that explain this part are refined to fine bins and
-traced backwards in time, from the anchor to the drive's beginning.
+rated again over the same turns. The few that are left are traced backwards in time, from the anchor to the drive's beginning.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,19 +51,27 @@ def anchor_samples(track: Track, most: int) -> list[int]:
     return chosen
 
 
-def starts_without_prior(problem: SearchProblem, anchor: int, config: RouteSearchConfig) -> InitialHypotheses:
+class Start(NamedTuple):
+    """Where the drive may have begun, by a search that began at one anchor."""
+
+    initial: InitialHypotheses  # at the drive's beginning
+    step_nats: float  # mean log likelihood of a step after the anchor, for the best of the hypotheses there; -inf: there is none
+
+
+def starts_without_prior(problem: SearchProblem, anchor: int, config: RouteSearchConfig) -> Start:
     """Find hypotheses for the beginning of the drive without a start pose, by a search that begins at sample ``anchor``.
 
-    The coarse search rates all bins and scales at the anchor; the good ones are traced back to the beginning of the drive.
+    The coarse search rates all bins and scales at the anchor, a fine one those that it finds good; what both find good is traced
+    back to the beginning of the drive.
     """
     nats, scales = _coarse_nats(problem, anchor, config), len(problem.log_scale)
     bins = np.flatnonzero(nats.max(axis=1) > NOWHERE).astype(np.int32)
     hypotheses = _hypotheses_in(problem.graph, bins, scales, float(problem.track.heading_rad[anchor]))
     hypotheses["score_nats"] = nats[bins].ravel()
-    hypotheses = hypotheses[hypotheses["score_nats"] > NOWHERE]
+    hypotheses, step_nats = _good_over_horizon(problem, anchor, hypotheses[hypotheses["score_nats"] > NOWHERE], config)
     if anchor == 0:
-        return InitialHypotheses(hypotheses, _NO_PLACES)
-    return _traced_to_beginning(problem, anchor, hypotheses, config)
+        return Start(InitialHypotheses(hypotheses, _NO_PLACES), step_nats)
+    return Start(_traced_to_beginning(problem, anchor, hypotheses, config), step_nats)
 
 
 def starts_near_pose(problem: SearchProblem, start: StartPose, config: RouteSearchConfig) -> InitialHypotheses:
@@ -154,6 +163,28 @@ def _coarse_bin_of_lane(fine: LaneGraph, coarse: LaneGraph) -> IntArray:
     counts = np.diff(fine.lane_start)[fine.lane]
     order = np.arange(fine.bin_count) - fine.lane_start[fine.lane]
     return ((order + 0.5) / counts * np.diff(coarse.lane_start)[fine.lane]).astype(np.int32)
+
+
+def _good_over_horizon(
+    problem: SearchProblem, anchor: int, hypotheses: Hypotheses, config: RouteSearchConfig
+) -> tuple[Hypotheses, float]:
+    """Those of the hypotheses at the anchor that also explain the turns after it in fine bins, with their scores there.
+
+    Without this, all fine states of a good coarse one would be traced back over the whole drive before it. The second value is
+    the mean log likelihood of a step on the best route from any of them.
+    """
+    drive = compiled_drive(problem, problem.track.heading_rad[anchor : anchor + _HORIZON])
+    steps = len(drive.heading_rad) - 1
+    if steps < 1:
+        return hypotheses, 0.0
+    model, fresh = compiled_model(problem), hypotheses.copy()
+    fresh["score_nats"] = 0.0  # the coarse scores are of the same turns and must not count twice
+    survivors = forward_pass(drive, model, InitialHypotheses(fresh, _NO_PLACES), config.beam_nats, config.most_survivors)
+    last = last_survivors(survivors).hypotheses["score_nats"]
+    through = backward(drive, model, config.seed_margin_nats, survivors, np.zeros(len(last), np.float32))[: len(fresh)]
+    fresh["score_nats"] = through
+    ended = len(survivors.row_start) - 2 < steps
+    return fresh[through > NOWHERE], NOWHERE if ended else float(last.max()) / steps
 
 
 def _traced_to_beginning(

@@ -1,4 +1,4 @@
-"""Segments of a route and their log-odds, by hand."""
+"""Segments of a route and the evidence for them, by hand."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ from hippodrome.core.matching.segments import (
     consistent_with_closures,
     route_segments,
     significant_segments,
-    turning_rad,
+    with_evidence,
 )
 
 
@@ -21,37 +21,58 @@ def track(heading_rad):
 
 
 def route(heading_rad, score_nats, log_scale=None, points_m=None):
-    """As much of a route as the log-odds are taken from."""
+    """As much of a route as the evidence is taken from."""
     count = len(heading_rad)
     return SimpleNamespace(
         track=track(heading_rad),
         score_nats=np.asarray(score_nats, dtype=float),
         log_scale=np.zeros(count) if log_scale is None else np.asarray(log_scale, dtype=float),
         points_m=np.zeros((count, 2)) if points_m is None else points_m,
+        lane=np.zeros(count, dtype=np.int32),
     )
 
 
-def test_a_right_angle_counts_once_and_noise_not_at_all():
-    corner = np.where(np.arange(40) < 20, 0.0, 0.5 * np.pi)
-    assert turning_rad(track(corner)).sum() == pytest.approx(0.5 * np.pi - 0.15)
-    assert turning_rad(track(0.07 * (-1.0) ** np.arange(40))).sum() == 0.0
+def test_a_segment_is_a_run_of_explained_samples():
+    explained = np.isin(np.arange(20), [2, 3, 4, 9, 10])
+    assert [(s.first, s.end) for s in route_segments(route(np.zeros(20), np.zeros(20)), explained)] == [(2, 5), (9, 11)]
 
 
-def test_a_segment_is_credited_for_turns_and_debited_for_its_score():
+def test_a_segment_is_judged_by_its_mirror_image_less_the_choice_of_it():
     corner = np.where(np.arange(40) < 20, 0.0, 0.5 * np.pi)
-    explained = np.arange(40) >= 10
-    (found,) = route_segments(route(corner, np.full(40, -0.1)), explained, 6.0)
-    assert (found.first, found.end) == (10, 40)
-    assert found.log_odds_nats == pytest.approx(6.0 * (0.5 * np.pi - 0.15) - 0.1 * 29)  # the step onto the network does not count
+    asked = []
+
+    def control(first, end, least_nats):
+        asked.append((first, end, least_nats))
+        return -30.0
+
+    drive, whole, half = route(corner, np.full(40, -0.1)), RouteSegment(0, 40), RouteSegment(10, 30)
+    (found,) = with_evidence([whole], drive, control, 50.0)
+    assert found.evidence_nats == pytest.approx(30.0 - 2.0 * 3.9)  # the step that leads to the first sample does not count
+    assert asked[0] == (0, 40, pytest.approx(-2.0 * 3.9 - 50.0))
+    (found,) = with_evidence([half], drive, control, 50.0)
+    assert found.evidence_nats == pytest.approx(30.0 - 2.0 * 1.9 - 2.0 * np.log(2.0))
+
+
+def test_what_does_not_turn_is_no_evidence_and_is_not_searched():
+    def control(first, end, least_nats):
+        raise AssertionError("searched")
+
+    assert with_evidence([RouteSegment(0, 40)], route(np.zeros(40), np.zeros(40)), control, 8.0)[0].evidence_nats == 0.0
+
+
+def test_short_gaps_carry_certainty_on_and_jumps_of_the_scale_do_not():
+    found = [RouteSegment(0, 5), RouteSegment(9, 20), RouteSegment(20, 30), RouteSegment(60, 90, 40.0), RouteSegment(95, 99)]
+    assert significant_segments(found, 8.0, 3.0, start_known=False) == found[3:]  # 30 samples are too long a gap
+    assert significant_segments(found, 8.0, 3.0, start_known=True) == [*found[:2], *found[3:]]
 
 
 def test_a_jump_of_the_scale_begins_another_segment():
-    found = route_segments(route(np.zeros(20), np.zeros(20), np.where(np.arange(20) < 8, 0.0, 0.4)), np.ones(20, bool), 6.0)
+    found = route_segments(route(np.zeros(20), np.zeros(20), np.where(np.arange(20) < 8, 0.0, 0.4)), np.ones(20, bool))
     assert [(s.first, s.end) for s in found] == [(0, 8), (8, 20)]
 
 
 def test_one_certain_segment_carries_the_others():
-    found = [RouteSegment(0, 5, 3.0), RouteSegment(9, 20, 8.0), RouteSegment(30, 90, 40.0)]
+    found = [RouteSegment(0, 5, 3.0), RouteSegment(19, 30, 8.0), RouteSegment(50, 90, 40.0)]
     assert significant_segments(found, 24.0, 6.0, start_known=False) == found[1:]
     assert significant_segments(found[:2], 24.0, 6.0, start_known=False) == []
     assert significant_segments(found[:2], 24.0, 6.0, start_known=True) == found[:2]

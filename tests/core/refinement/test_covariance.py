@@ -63,5 +63,5 @@ def test_the_far_end_of_a_closure_is_not_taken_known(problem):
 
 
 def test_what_never_averages_out_is_added_to_both_axes():
-    added = with_systematic_errors(np.zeros((2, 4, 4)), survey_sigma_m=0.5)
-    np.testing.assert_allclose(added[1], np.diag([0.26, 0.26, 1e-4, 0.0]))
+    added = with_systematic_errors(np.zeros((2, 6, 6)))
+    np.testing.assert_allclose(added[1], np.diag([0.01, 0.01, 1e-4, 0.0, 0.0, 0.0]))

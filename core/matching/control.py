@@ -1,0 +1,88 @@
+"""The mirrored drive as a control: how well chance explains a drive in this very network.
+
+A drive whose turns are all reversed, left for right, was never driven. Whatever route explains it well does so by chance, and in
+the same network, at the same length and with as many turns as the drive itself: its cost is what chance achieves. A right route
+costs far less. A wrong one costs about as much as its mirror image, sometimes a little more, sometimes a little less. Controls of
+this kind are known as decoys where sequences are identified in a database (J. E. Elias, S. P. Gygi, "Target-decoy search
+strategy", 2007).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import TypeAlias
+
+import numpy as np
+
+from hippodrome.core.matching.search.config import RouteSearchConfig
+from hippodrome.core.matching.search.passes import best_nats
+from hippodrome.core.matching.search.problem import SearchProblem
+from hippodrome.core.matching.search.route import Route
+from hippodrome.core.matching.search.starts import anchor_samples, starts_without_prior
+from hippodrome.core.matching.search.track import Track
+
+Control: TypeAlias = Callable[[int, int, float], float]  # first and end sample, least log likelihood -> ``mirrored_nats``
+
+FACTOR = 2.0  # chance must cost at least this many times what the route costs: wrong ones cost 0.6 to 1.6 times as much
+_WINDOW = 120  # steps (600 m) around the most turning that are tried first: a right route has proved itself there nearly always
+_GOOD_STEP_NATS = 0.5  # mean cost of a step up to which a longer part is tried: a right route has 0.1-0.3, chance about 1
+_LEAST_TURN_RAD = 0.7  # less turning than half a crossing fits everywhere, to the left as to the right
+
+
+def control_of(problem: SearchProblem, config: RouteSearchConfig) -> Control:
+    """The control for the parts of one drive."""
+    return partial(mirrored_nats, problem, config)
+
+
+def mirrored_nats(problem: SearchProblem, config: RouteSearchConfig, first: int, end: int, least_nats: float) -> float:
+    """Log likelihood of the best route of the mirrored samples ``first`` to ``end - 1`` of the drive, from an unknown start.
+
+    It is -inf if it is below ``least_nats``; the search ends as soon as that is certain.
+    """
+    mirrored = replace(problem, track=mirrored_part(problem.track, first, end))
+    start = starts_without_prior(mirrored, anchor_samples(mirrored.track, 1)[0], config)
+    return best_nats(mirrored, start.initial, config, least_nats)
+
+
+def mirrored_part(track: Track, first: int, end: int) -> Track:
+    """The samples ``first`` to ``end - 1`` of a track with every turn to the other side."""
+    arc, heading = track.arc[first:end] - track.arc[first], track.heading_rad[first:end]
+    return Track(arc, heading[0] - heading, arc, track.step)
+
+
+def evidence_nats(route: Route, first: int, end: int, control: Control, enough_nats: float) -> float:
+    """Evidence that the samples ``first`` to ``end - 1`` of the route were driven: ``FACTOR`` times their log likelihood, less
+    that of the mirrored drive.
+
+    It is cut off at ``enough_nats``. The turns around one place are tried first, and the whole part only if they leave it open.
+    """
+    if turned_rad(route.track, first, end) < _LEAST_TURN_RAD:
+        return 0.0
+    window_first, window_end = _most_turning(route.track, first, end)
+    found = _evidence_within(route, window_first, window_end, control, enough_nats)
+    is_good = float(np.mean(route.score_nats[first + 1 : end])) > -_GOOD_STEP_NATS
+    if found < enough_nats and is_good and (window_first, window_end) != (first, end):
+        return _evidence_within(route, first, end, control, enough_nats)
+    return found
+
+
+def turned_rad(track: Track, first: int, end: int) -> float:
+    """By how much the headings of a part of the track differ at most."""
+    return float(np.ptp(track.heading_rad[first:end]))
+
+
+def _evidence_within(route: Route, first: int, end: int, control: Control, enough_nats: float) -> float:
+    """``evidence_nats`` of exactly these samples. The step that leads to the first of them does not count."""
+    own = FACTOR * float(np.sum(route.score_nats[first + 1 : end]))
+    return min(own - control(first, end, own - enough_nats), enough_nats)
+
+
+def _most_turning(track: Track, first: int, end: int) -> tuple[int, int]:
+    """First and end sample of the ``_WINDOW`` samples within a part of the track over which the vehicle turns most."""
+    if end - first <= _WINDOW:
+        return first, end
+    turned = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(track.heading_rad[first:end])))])
+    begin = first + int(np.argmax(turned[_WINDOW - 1 :] - turned[: len(turned) - _WINDOW + 1]))
+    return begin, begin + _WINDOW

@@ -16,6 +16,7 @@ from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.folder import new_folder
 from hippodrome.eval.exchange.drives.foreign import ForeignDrive, Motion, motion_of, require_increasing
 from hippodrome.eval.exchange.drives.images import decode
+from hippodrome.eval.exchange.drives.lever import Ahead
 from hippodrome.eval.exchange.drives.new_recording import camera_record, field_of_view_deg, seal, write_frames, write_steps
 from hippodrome.eval.exchange.drives.plausible import require_plausible
 from hippodrome.eval.exchange.drives.poses import Axes
@@ -63,6 +64,8 @@ class ImportOptions:
     time_offset_s: float = 0.0  # added to the times of the self-motion
     calibration: Path | None = None  # of the camera
     camera_height_m: float = 1.5  # above the road, for "visual"
+    camera_ahead: Ahead = "auto"  # how far ahead of the rear axle the poses of ``odometry`` lie, in their unit
+    truth_ahead: Ahead | None = None  # the same of the truth's poses; None: as ``camera_ahead``
 
 
 def import_drive(options: ImportOptions) -> None:
@@ -104,6 +107,7 @@ def import_drive(options: ImportOptions) -> None:
                 "source": options.source.name,
                 "self_motion": origin,
                 "time_origin_s": begin_s(motion),
+                **({"truth_ahead": known.ahead_m} if known is not None and known.ahead_m else {}),
                 **_intrinsics(calibration, own_px, (width, height)),
             },
             "camera": camera_record(samples, (width, height), fov_deg),
@@ -131,7 +135,7 @@ def _read(options: ImportOptions, kind: str, axes: Axes) -> ForeignDrive:
     if kind == "video":
         return read_video(options.source, options.fps)
     if kind == "odometry":
-        return read_bare_odometry(options.source, axes, options.fps, options.time_unit)
+        return read_bare_odometry(options.source, axes, options.fps, options.time_unit, options.camera_ahead)
     name, reader = READERS[kind]
     module = optional_module(f"hippodrome.eval.exchange.readers.{name}")
     drive: ForeignDrive = getattr(module, reader)(options.source, axes)
@@ -171,12 +175,18 @@ def _intrinsics(
 
 
 def _known_truth(options: ImportOptions, drive: ForeignDrive, axes: Axes, pose_t_s: FloatArray) -> Truth | None:
-    """The truth that the options name, or the layout's own; None where there is none. KITTI's poses have the frames' times."""
+    """The truth that the options name, or the layout's own, of the rear axle; None where there is none.
+
+    KITTI's poses have the frames' times.
+    """
     if options.truth is None:
-        return truth_of_trajectory(drive.truth) if drive.truth is not None else None
-    if options.truth.suffix.lower() == ".txt" and is_kitti_poses(options.truth):
-        return truth_of_trajectory(read_poses(options.truth, axes, pose_t_s, None))
-    return read_truth(options.truth, axes, options.network, options.truth_sigma_m)
+        known = truth_of_trajectory(drive.truth) if drive.truth is not None else None
+    elif options.truth.suffix.lower() == ".txt" and is_kitti_poses(options.truth):
+        known = truth_of_trajectory(read_poses(options.truth, axes, pose_t_s, None))
+    else:
+        known = read_truth(options.truth, axes, options.network, options.truth_sigma_m)
+    said = options.camera_ahead if options.truth_ahead is None else options.truth_ahead
+    return None if known is None else known.at_axle(said, "the truth")
 
 
 def _motion(
@@ -200,7 +210,7 @@ def _motion(
     if given == VISUAL:
         return _seen_motion(options, drive, calibration)
     pose_t_s = drive.pose_t_s if drive.pose_t_s is not None else np.array([frame.t_s for frame in drive.frames])
-    return read_self_motion(Path(given), options.axes or "body", pose_t_s, options.time_unit)
+    return read_self_motion(Path(given), options.axes or "body", pose_t_s, options.time_unit, options.camera_ahead)
 
 
 def _seen_motion(options: ImportOptions, drive: ForeignDrive, calibration: Calibration | None) -> tuple[Motion, str]:

@@ -10,7 +10,8 @@ import numpy as np
 from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.exchange.drives.errors import ExchangeError
-from hippodrome.eval.exchange.drives.poses import Axes, planar, rotations
+from hippodrome.eval.exchange.drives.poses import Axes, rotations
+from hippodrome.eval.files.spatial import SpatialPoses, believed, flatten
 from hippodrome.eval.metrics.association import MAX_GAP_S
 
 MIN_NORM, MAX_NORM = 0.5, 1.5  # limits of a unit quaternion's norm: writers round
@@ -63,13 +64,28 @@ def trajectory_of(t_s: FloatArray, positions: FloatArray, quaternions_xyzw: Floa
     if not ((norm > MIN_NORM) & (norm < MAX_NORM)).all():
         bad = int(np.flatnonzero(~((norm > MIN_NORM) & (norm < MAX_NORM)))[0])
         raise ExchangeError(f"{name}: pose {bad} has no unit quaternion")
-    return with_increasing_times(Trajectory(t_s, planar(positions, rotations(quaternions_xyzw), axes)), name)
+    return level_trajectory(t_s, positions, rotations(quaternions_xyzw), axes, name)
 
 
-def with_increasing_times(trajectory: Trajectory, name: str) -> Trajectory:
-    """The trajectory itself. Raises ExchangeError if its times do not increase."""
-    require_increasing(trajectory.t_s, name)
-    return trajectory
+def level_trajectory(t_s: FloatArray, positions: FloatArray, rotation: FloatArray, axes: Axes, name: str) -> Trajectory:
+    """Planar poses of poses in space: turned so that the ground is level, then height, roll and pitch are dropped.
+
+    Rows that repeat the time of the one before are left out. That and what else was done to them is printed.
+
+    Args:
+        t_s: Times (N,).
+        positions: Positions (N, 3) in a world whose z is up but for a tilt.
+        rotation: Attitudes (N, 3, 3).
+        axes: What the attitude turns.
+        name: How errors name the poses.
+
+    Raises:
+        HippodromeError: The poses are not finite, not in order of time, or contradict themselves.
+    """
+    poses = believed(name, SpatialPoses(t_s, positions, rotation, axes))
+    for note in poses.notes:
+        print(f"note: {note}")
+    return flatten(poses)
 
 
 def require_increasing(t_s: FloatArray, name: str) -> None:

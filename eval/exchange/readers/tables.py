@@ -9,18 +9,19 @@ import numpy as np
 import yaml
 
 from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.eval.exchange.drives.camera import OPTICAL_IN_BODY
 from hippodrome.eval.exchange.drives.clock import TimeUnit, in_seconds
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import (
     ForeignDrive,
     ForeignFrame,
     Motion,
+    level_trajectory,
     motion_table,
     trajectory_of,
-    with_increasing_times,
 )
 from hippodrome.eval.exchange.drives.images import file_frame
-from hippodrome.eval.exchange.drives.poses import Axes, planar
+from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.drives.tables import ODOMETRY
 from hippodrome.eval.exchange.readers.motion_csv import read_motion
 from hippodrome.eval.exchange.readers.pictures import image_files
@@ -141,9 +142,18 @@ def kitti_poses(poses: Path, t_s: FloatArray, origin_file: Path | None, axes: Ax
     found = np.tile(np.eye(4), (len(table), 1, 1))
     found[:, :3] = table.reshape(-1, 3, 4)
     if origin_file is not None and origin_file.exists():
-        placed = read_table(origin_file, 4)[:4].reshape(4, 4) @ found
-        return with_increasing_times(Trajectory(t_s, planar(placed[:, :3, 3], placed[:, :3, :3], "camera")), str(poses))
-    return with_increasing_times(Trajectory(t_s, planar(found[:, :3, 3], found[:, :3, :3], axes, world="camera")), str(poses))
+        placed = _origin(origin_file) @ found
+        return level_trajectory(t_s, placed[:, :3, 3], placed[:, :3, :3], "camera", str(poses))
+    positions, rotation = found[:, :3, 3] @ OPTICAL_IN_BODY.T, OPTICAL_IN_BODY @ found[:, :3, :3]
+    return level_trajectory(t_s, positions, rotation, axes, str(poses))
+
+
+def _origin(path: Path) -> FloatArray:
+    """The pose (4, 4) that our exports wrote. Raises ExchangeError."""
+    table = read_table(path, 4)
+    if len(table) != 4:
+        raise ExchangeError(f"{path}: {len(table)} lines of numbers, expected a matrix of 4; export the drive anew")
+    return table
 
 
 def _kitti_focal(path: Path) -> float | None:

@@ -59,6 +59,16 @@ def test_our_export_comes_back(run, exported, tmp_path, kind):
     assert back.manifest["truth_frame"] == "network"
 
 
+def test_poses_of_a_camera_are_moved_to_the_rear_axle(run, exported, tmp_path, capsys):
+    source, options = exported("kitti") / SOURCES["kitti"], ("--truth-frame", "network", "--camera-ahead", "1.5")
+    assert imported(source, "kitti", tmp_path / "in", *options) == DONE
+    assert "1.5 ahead of the rear axle" in capsys.readouterr().out
+    back, ours = open_recording(tmp_path / "in"), run.mapping
+    known = ours.samples.frame_steps
+    assert np.abs(back.samples.poses_m[known] - ours.samples.poses_m[known]).max() < 1e-9
+    assert back.manifest["imported"]["truth_ahead"] == 1.5
+
+
 def smooth_drive(seed, count=200):
     rng = np.random.default_rng(seed)
     turn = np.repeat(rng.normal(0.0, 0.3, 20), count // 20)

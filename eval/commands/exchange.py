@@ -92,6 +92,12 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
         help="seconds to add to the times of the self-motion, to lay its clock on that of the frames (default: 0)",
     )  # fmt: skip
     into.add_argument(
+        "--topic", action="append", default=[], metavar="NAME", dest="topics",
+        help="a topic of an MCAP file or a bag that is used: of the camera, of the odometry, of the true poses (a second "
+             "odometry is the truth, too); may be given several times (default: the first of each, the truth by its name; what "
+             "is used is printed)",
+    )  # fmt: skip
+    into.add_argument(
         "--calibration", type=Path, metavar="FILE",
         help="the camera's calibration: KITTI's calib.txt, nine numbers of a matrix, OpenCV's or ROS's YAML; frames are freed of "
              "the distortion that it describes (default: the layout's focal length, if any)",
@@ -264,7 +270,7 @@ def import_command(options: argparse.Namespace) -> int:
             network=options.network, truth_sigma_m=options.truth_sigma, axes=options.axes, truth_frame=options.truth_frame,
             size_px=options.size, fps=options.fps, time_unit=options.time_unit, time_offset_s=options.time_offset_s,
             calibration=options.calibration, camera_height_m=options.camera_height_m, camera_ahead=options.camera_ahead,
-            truth_ahead=options.truth_ahead,
+            truth_ahead=options.truth_ahead, topics=tuple(options.topics),
         )
     )  # fmt: skip
     return DONE

@@ -40,6 +40,7 @@ READERS: Final = {
     "mcap": ("mcap_file", "read_mcap"),
     "rosbag": ("rosbag", "read_rosbag"),
 }
+LOGS: Final = ("mcap", "rosbag")  # the layouts of messages on topics
 FROM_TRUTH: Final = "truth"  # the value of --odometry that differentiates the truth
 VISUAL: Final = "visual"  # the value of --odometry that looks at the frames
 TruthFrame: TypeAlias = Literal["network", "own"]
@@ -65,6 +66,7 @@ class ImportOptions:
     calibration: Path | None = None  # of the camera
     camera_height_m: float = 1.5  # above the road, for "visual"
     camera_ahead: Ahead = "auto"  # how far ahead of the rear axle the poses of ``odometry`` lie, in their unit
+    topics: tuple[str, ...] = ()  # those of a log that are used; the others are chosen by their names and types
     truth_ahead: Ahead | None = None  # the same of the truth's poses; None: as ``camera_ahead``
 
 
@@ -130,6 +132,8 @@ def import_drive(options: ImportOptions) -> None:
 
 def _read(options: ImportOptions, kind: str, axes: Axes) -> ForeignDrive:
     """The drive as its reader hands it over. Raises HippodromeError."""
+    if options.topics and kind not in LOGS:
+        raise ExchangeError(f"{options.source}: --topic is for {' and '.join(LOGS)}, this is {kind}; leave it out")
     if kind == "images":
         return read_image_folder(options.source, options.fps)
     if kind == "video":
@@ -138,7 +142,8 @@ def _read(options: ImportOptions, kind: str, axes: Axes) -> ForeignDrive:
         return read_bare_odometry(options.source, axes, options.fps, options.time_unit, options.camera_ahead)
     name, reader = READERS[kind]
     module = optional_module(f"hippodrome.eval.exchange.readers.{name}")
-    drive: ForeignDrive = getattr(module, reader)(options.source, axes)
+    function: Any = getattr(module, reader)
+    drive: ForeignDrive = function(options.source, axes, options.topics) if kind in LOGS else function(options.source, axes)
     return drive
 
 

@@ -172,7 +172,7 @@ def _estimate(
         poses = replace(poses, t_s=poses.t_s - origin_s)
         if abs(origin_s) >= LEAST_ORIGIN_S:
             sheet.note(
-                f"{options.estimate}: taken to be in the clock of the drive's source, {origin_s:g} s before the recording's"
+                f"{options.estimate}: taken to be in the clock of the drive's source; the recording begins at {origin_s:.3f} s"
             )
     fitted = not (options.network_frame and same_world)
     trajectory = flatten(poses, truth.in_space() if fitted else None)

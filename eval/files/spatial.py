@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.files.directions import angle_deg, chords, turn_up
-from hippodrome.eval.files.trajectories import HEAD, MAX_BYTES
+from hippodrome.eval.files.rows import row_of_numbers, text_lines
+from hippodrome.eval.files.trajectories import HEAD
 from hippodrome.eval.metrics.alignment import DegenerateAlignment, umeyama
 from hippodrome.eval.metrics.association import TrajectoryError
 
@@ -53,7 +54,7 @@ def read_poses(path: Path, axes: Axes | None = None, times: Path | None = None) 
     Raises:
         TrajectoryError: The file is not such poses, or contradicts itself; the message names file, line and cure.
     """
-    lines = _lines(path)
+    lines = text_lines(path)
     rows = [(n, line.split()) for n, line in enumerate(lines, start=1) if line.strip() and not line.lstrip().startswith("#")]
     if not rows:
         raise TrajectoryError(f"{path}: no poses")
@@ -62,7 +63,7 @@ def read_poses(path: Path, axes: Axes | None = None, times: Path | None = None) 
         raise TrajectoryError(
             f"{path}: line {rows[0][0]}: {width} columns, expected 8 (TUM: t x y z qx qy qz qw) or 12 (KITTI, with --times)"
         )
-    table = np.array([_numbers(path, number, words, width) for number, words in rows])
+    table = np.array([row_of_numbers(path, number, words, width) for number, words in rows])
     if width == 12:
         found = _kitti(path, table, axes or "camera", times)
     else:
@@ -72,7 +73,7 @@ def read_poses(path: Path, axes: Axes | None = None, times: Path | None = None) 
 
 def is_own(path: Path) -> bool:
     """Whether hippodrome wrote this file of poses; its poses are the rear axle's. Raises TrajectoryError if it cannot be read."""
-    lines = _lines(path)
+    lines = text_lines(path)
     return bool(lines) and lines[0].startswith(HEAD)
 
 
@@ -99,6 +100,13 @@ def believed(name: str, poses: SpatialPoses) -> SpatialPoses:
     found = _with_course(name, found)
     _check(name, found)
     return found
+
+
+def axes_driven(poses: SpatialPoses) -> Axes | None:
+    """Whose axes the attitudes turn, by the way they move: "body" along x, "camera" along z; None where that does not tell."""
+    forward = motion_in_body(poses)
+    found: dict[int, Axes] = {0: "body", 2: "camera"}
+    return found.get(int(np.argmax(np.abs(forward)))) if np.linalg.norm(forward) > SURE else None
 
 
 def flatten(poses: SpatialPoses, truth: SpatialPoses | None = None) -> Trajectory:
@@ -267,7 +275,7 @@ def _tum(path: Path, table: FloatArray, axes: Axes, own: bool) -> SpatialPoses:
 def _kitti(path: Path, table: FloatArray, axes: Axes, times: Path | None) -> SpatialPoses:
     if times is None:
         raise TrajectoryError(f"{path}: 12 columns, poses of KITTI, have no times; give --times FILE, a time in seconds a line")
-    stamps = [line.split()[0] for line in _lines(times) if line.strip() and not line.lstrip().startswith("#")]
+    stamps = [line.split()[0] for line in text_lines(times) if line.strip() and not line.lstrip().startswith("#")]
     if len(stamps) != len(table):
         raise TrajectoryError(f"{times}: {len(stamps)} times for the {len(table)} poses of {path}")
     try:
@@ -276,21 +284,3 @@ def _kitti(path: Path, table: FloatArray, axes: Axes, times: Path | None) -> Spa
         raise TrajectoryError(f"{times}: {error}") from None
     matrices = table.reshape(-1, 3, 4)
     return SpatialPoses(t_s, matrices[:, :, 3], matrices[:, :, :3], axes)
-
-
-def _lines(path: Path) -> list[str]:
-    try:
-        if (size := path.stat().st_size) > MAX_BYTES:
-            raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
-        return path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise TrajectoryError(f"{path}: cannot be read as text: {error}") from None
-
-
-def _numbers(path: Path, number: int, words: list[str], width: int) -> list[float]:
-    if len(words) != width:
-        raise TrajectoryError(f"{path}: line {number}: {len(words)} columns, the lines before have {width}")
-    try:
-        return [float(word) for word in words]
-    except ValueError as error:
-        raise TrajectoryError(f"{path}: line {number}: {error}") from None

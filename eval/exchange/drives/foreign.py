@@ -11,7 +11,7 @@ from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.poses import Axes, rotations
-from hippodrome.eval.files.spatial import SpatialPoses, believed, flatten
+from hippodrome.eval.files.spatial import SpatialPoses, axes_driven, believed, flatten
 from hippodrome.eval.metrics.association import MAX_GAP_S
 
 MIN_NORM, MAX_NORM = 0.5, 1.5  # limits of a unit quaternion's norm: writers round
@@ -47,7 +47,9 @@ class ForeignDrive:
     truth_lat_lon: FloatArray | None = None  # (N, 3) seconds, latitude, longitude in degrees, where the layout has fixes
 
 
-def trajectory_of(t_s: FloatArray, positions: FloatArray, quaternions_xyzw: FloatArray, axes: Axes, name: str) -> Trajectory:
+def trajectory_of(
+    t_s: FloatArray, positions: FloatArray, quaternions_xyzw: FloatArray, axes: Axes, name: str, other_axes: bool = False
+) -> Trajectory:
     """Planar poses of poses in space.
 
     Args:
@@ -56,6 +58,7 @@ def trajectory_of(t_s: FloatArray, positions: FloatArray, quaternions_xyzw: Floa
         quaternions_xyzw: Attitudes (N, 4), each of a norm near 1.
         axes: What the attitude turns: the vehicle's axes (x forward) or a camera's (z forward).
         name: How errors name the poses.
+        other_axes: As of ``level_trajectory``.
 
     Raises:
         ExchangeError: A quaternion is far from a unit one, or the times do not increase.
@@ -64,10 +67,12 @@ def trajectory_of(t_s: FloatArray, positions: FloatArray, quaternions_xyzw: Floa
     if not ((norm > MIN_NORM) & (norm < MAX_NORM)).all():
         bad = int(np.flatnonzero(~((norm > MIN_NORM) & (norm < MAX_NORM)))[0])
         raise ExchangeError(f"{name}: pose {bad} has no unit quaternion")
-    return level_trajectory(t_s, positions, rotations(quaternions_xyzw), axes, name)
+    return level_trajectory(t_s, positions, rotations(quaternions_xyzw), axes, name, other_axes)
 
 
-def level_trajectory(t_s: FloatArray, positions: FloatArray, rotation: FloatArray, axes: Axes, name: str) -> Trajectory:
+def level_trajectory(
+    t_s: FloatArray, positions: FloatArray, rotation: FloatArray, axes: Axes, name: str, other_axes: bool = False
+) -> Trajectory:
     """Planar poses of poses in space: turned so that the ground is level, then height, roll and pitch are dropped.
 
     Rows that repeat the time of the one before are left out. That and what else was done to them is printed.
@@ -78,11 +83,17 @@ def level_trajectory(t_s: FloatArray, positions: FloatArray, rotation: FloatArra
         rotation: Attitudes (N, 3, 3).
         axes: What the attitude turns.
         name: How errors name the poses.
+        other_axes: Whether poses whose motion contradicts ``axes`` are taken for those of the other ones: of a layout's truth
+            where ``axes`` was said of another file.
 
     Raises:
         HippodromeError: The poses are not finite, not in order of time, or contradict themselves.
     """
-    poses = believed(name, SpatialPoses(t_s, positions, rotation, axes))
+    given = SpatialPoses(t_s, positions, rotation, axes)
+    if other_axes and (driven := axes_driven(given)) not in (None, axes):
+        print(f"note: {name}: the motion says that its poses are of {driven} axes, not of {axes} axes; they are taken so")
+        given = SpatialPoses(t_s, positions, rotation, driven or axes)
+    poses = believed(name, given)
     for note in poses.notes:
         print(f"note: {note}")
     return flatten(poses)

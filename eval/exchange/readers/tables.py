@@ -69,14 +69,14 @@ def read_euroc_folder(folder: Path, axes: Axes) -> ForeignDrive:
     if (root / EUROC_TRUTH).exists():
         table = read_table(root / EUROC_TRUTH, 8, ",")
         quaternion = np.roll(table[:, 4:8], -1, axis=1)
-        truth = trajectory_of(table[:, 0] / 1e9, table[:, 1:4], quaternion, axes, str(root / EUROC_TRUTH))
+        truth = trajectory_of(table[:, 0] / 1e9, table[:, 1:4], quaternion, axes, str(root / EUROC_TRUTH), True)
     return ForeignDrive(frames, motion, truth, _euroc_focal(root / "cam0" / "sensor.yaml"))
 
 
 def read_tum_poses(path: Path, axes: Axes) -> Trajectory:
     """A TUM trajectory, ``t x y z qx qy qz qw`` a line, with attitudes of any axes."""
     table = read_table(path, 8)
-    return trajectory_of(table[:, 0], table[:, 1:4], table[:, 4:8], axes, str(path))
+    return trajectory_of(table[:, 0], table[:, 1:4], table[:, 4:8], axes, str(path), True)
 
 
 def read_poses(path: Path, axes: Axes, t_s: FloatArray | None, unit: TimeUnit | None) -> Trajectory:

@@ -88,8 +88,9 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
         help="unit of the times in the file of self-motion (default: its header's, or recognised by size and interval)",
     )
     into.add_argument(
-        "--time-offset", type=float, default=0.0, metavar="S", dest="time_offset_s",
-        help="seconds to add to the times of the self-motion, to lay its clock on that of the frames (default: 0)",
+        "--time-offset", type=_offset, default=0.0, metavar="S", dest="time_offset_s",
+        help="seconds to add to the times of the self-motion, to lay its clock on that of the frames; auto: told by the turns "
+             "that the truth, if it has headings, or else the frames show; refused where that is not sure (default: 0)",
     )  # fmt: skip
     into.add_argument(
         "--topic", action="append", default=[], metavar="NAME", dest="topics",
@@ -215,6 +216,18 @@ def _above_zero(text: str) -> float:
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    return value
+
+
+def _offset(text: str) -> float | str:
+    if text == "auto":
+        return text
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) <= 1e11:
+        raise argparse.ArgumentTypeError(f"'{text}' is neither auto nor a number of seconds")
     return value
 
 

@@ -18,6 +18,13 @@ from hippodrome.eval.exchange.drives.foreign import ForeignDrive, Motion, motion
 from hippodrome.eval.exchange.drives.images import decode
 from hippodrome.eval.exchange.drives.lever import Ahead
 from hippodrome.eval.exchange.drives.new_recording import camera_record, field_of_view_deg, seal, write_frames, write_steps
+from hippodrome.eval.exchange.drives.offset import (
+    TimeOffset,
+    told_offset,
+    turns_of_frames,
+    turns_of_motion,
+    turns_of_trajectory,
+)
 from hippodrome.eval.exchange.drives.plausible import require_plausible
 from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.drives.steps import begin_s, frames_within, steps_of
@@ -62,7 +69,7 @@ class ImportOptions:
     size_px: tuple[int, int] | None = None  # width and height to scale frames to; None: as they are
     fps: float | None = None  # frames a second, where nothing else says when they were taken
     time_unit: TimeUnit | None = None  # of the file of ``odometry``; None: recognised
-    time_offset_s: float = 0.0  # added to the times of the self-motion
+    time_offset_s: TimeOffset = 0.0  # added to the times of the self-motion; "auto": told by turns
     calibration: Path | None = None  # of the camera
     camera_height_m: float = 1.5  # above the road, for "visual"
     camera_ahead: Ahead = "auto"  # how far ahead of the rear axle the poses of ``odometry`` lie, in their unit
@@ -85,10 +92,10 @@ def import_drive(options: ImportOptions) -> None:
     known = _known_truth(options, drive, axes, pose_t_s)
     truth = known.trajectory if known is not None else None
     motion, origin = _motion(options, drive, truth, calibration)
-    if options.time_offset_s:
-        motion = replace(motion, t_s=motion.t_s + options.time_offset_s)
+    if offset_s := _offset_s(options, drive, motion, known, calibration):
+        motion = replace(motion, t_s=motion.t_s + offset_s)
         if options.odometry == FROM_TRUTH and known is not None:
-            known = known.moved(options.time_offset_s)
+            known = known.moved(offset_s)
             truth = known.trajectory
     require_plausible(motion, f"{options.source}: self-motion ({origin})")
     frames = frames_within(drive.frames, motion, options.source)
@@ -216,6 +223,26 @@ def _motion(
         return _seen_motion(options, drive, calibration)
     pose_t_s = drive.pose_t_s if drive.pose_t_s is not None else np.array([frame.t_s for frame in drive.frames])
     return read_self_motion(Path(given), options.axes or "body", pose_t_s, options.time_unit, options.camera_ahead)
+
+
+def _offset_s(
+    options: ImportOptions, drive: ForeignDrive, motion: Motion, known: Truth | None, calibration: Calibration | None
+) -> float:
+    """Seconds to add to the times of the self-motion: as said, or told by the turns of truth or frames, and then printed.
+
+    Raises ExchangeError where they do not tell.
+    """
+    if options.time_offset_s != "auto":
+        return options.time_offset_s
+    if options.odometry in (FROM_TRUTH, VISUAL):
+        raise ExchangeError(f"{options.source}: --time-offset auto needs self-motion with a clock of its own; leave it out")
+    if known is not None and known.has_heading and len(known.trajectory.t_s) > 2:
+        return told_offset(turns_of_motion(motion), turns_of_trajectory(known.trajectory, "the truth"))
+    own_px = _size_of(drive)
+    if own_px is None or len(drive.frames) < 3:
+        raise ExchangeError(f"{options.source}: neither frames nor true headings to tell the time offset by; give it in seconds")
+    undistort = undistorter(calibration, own_px) if calibration else (lambda frame: frame)
+    return told_offset(turns_of_motion(motion), turns_of_frames(drive.frames, undistort))
 
 
 def _seen_motion(options: ImportOptions, drive: ForeignDrive, calibration: Calibration | None) -> tuple[Motion, str]:

@@ -115,6 +115,13 @@ def test_evo_compares_what_was_exported_with_the_commands_of_the_page(exported, 
     assert 0.0 < float(said.split("mean")[1].split()[0]) < 2.0
 
 
+def test_evo_reads_our_bags(exported, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    bag = exported("rosbag2") / "hamlet-mapping"
+    said = evo("evo_ape", "bag2", bag, "/ground_truth", "/estimate/topometric", "--t_max_diff", "0.06")
+    assert 0.0 < float(said.split("mean")[1].split()[0]) < 2.0
+
+
 def test_a_sweep_is_exported(run, tmp_path):
     cell = tmp_path / "sweep" / "cells" / "0a1b"
     cell.mkdir(parents=True)

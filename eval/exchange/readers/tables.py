@@ -45,7 +45,7 @@ def read_kitti_sequence(folder: Path, axes: Axes) -> ForeignDrive:
     images = next((folder / name for name in KITTI_CAMERAS if (folder / name).is_dir()), None)
     if images is None:
         raise ExchangeError(f"{folder}: no image_2 or image_0 in it; give a folder sequences/NN of the KITTI odometry layout")
-    numbered = {int(path.stem): path for path in image_files(images) if path.stem.isdigit()}
+    numbered = {int(path.stem): path for path in image_files(images) if path.stem.isdecimal()}
     frames = [file_frame(float(t), numbered[number]) for number, t in enumerate(t_s) if number in numbered]
     if not frames:
         raise ExchangeError(f"{images}: no file NNNNNN.png or NNNNNN.jpg in it")
@@ -123,7 +123,7 @@ def _listed(table: Path, separator: str | None, unit_s: float, images: Path) -> 
             # whole nanoseconds divided, as evo and everybody does: a product with 1e-9 would round differently
             t_s = int(words[0]) / 1e9 if unit_s == 1e-9 else float(words[0]) * unit_s
             name = words[1]
-        except (ValueError, IndexError):
+        except (ValueError, IndexError, OverflowError):
             raise ExchangeError(f"{table}: line {number}: not a time and a file name") from None
         if not np.isfinite(t_s):
             raise ExchangeError(f"{table}: line {number}: the time is not finite")
@@ -175,5 +175,5 @@ def _euroc_focal(path: Path) -> float | None:
     try:
         values: Any = yaml.safe_load("\n".join(line for line in read_lines(path) if not line.startswith("%YAML")))
         return float(values["intrinsics"][0]) if isinstance(values, dict) and "intrinsics" in values else None
-    except (yaml.YAMLError, ValueError, TypeError, IndexError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError, TypeError, IndexError, KeyError, OverflowError, RecursionError) as error:
         raise ExchangeError(f"{path}: not a sensor description ({' '.join(str(error).split())[:80]})") from None

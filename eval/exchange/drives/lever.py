@@ -49,9 +49,8 @@ def lever_of(trajectory: Trajectory, said: Ahead, name: str) -> Lever:
         name: How the words name the poses.
     """
     if said != "auto":
-        return Lever(
-            said, f"{name}: its poses are taken {said:g} ahead of the rear axle, as --camera-ahead or --truth-ahead says"
-        )
+        where = f"those of a point {said:g} ahead of the rear axle" if said else "those of the rear axle"
+        return Lever(said, f"{name}: its poses are taken for {where}, as --camera-ahead or --truth-ahead says")
     found = estimated(trajectory)
     if found is None:
         return NO_LEVER

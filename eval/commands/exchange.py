@@ -88,8 +88,15 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
         help="unit of the times in the file of self-motion (default: its header's, or recognised by size and interval)",
     )
     into.add_argument(
-        "--time-offset", type=float, default=0.0, metavar="S", dest="time_offset_s",
-        help="seconds to add to the times of the self-motion, to lay its clock on that of the frames (default: 0)",
+        "--time-offset", type=_offset, default=0.0, metavar="S", dest="time_offset_s",
+        help="seconds to add to the times of the self-motion, to lay its clock on that of the frames; auto: told by the turns "
+             "that the truth, if it has headings, or else the frames show; refused where that is not sure (default: 0)",
+    )  # fmt: skip
+    into.add_argument(
+        "--topic", action="append", default=[], metavar="NAME", dest="topics",
+        help="a topic of an MCAP file or a bag that is used: of the camera, of the odometry, of the true poses (a second "
+             "odometry is the truth, too); may be given several times (default: the first of each, the truth by its name; what "
+             "is used is printed)",
     )  # fmt: skip
     into.add_argument(
         "--calibration", type=Path, metavar="FILE",
@@ -99,6 +106,16 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
     into.add_argument(
         "--camera-height", type=_rate, default=1.5, metavar="M", dest="camera_height_m",
         help="height of the camera above the road in metres, for --odometry visual (default: 1.5)",
+    )  # fmt: skip
+    into.add_argument(
+        "--camera-ahead", type=_ahead, default="auto", metavar="N",
+        help="how far ahead of the rear axle the camera sits whose poses are differentiated or are the truth, in the unit of the "
+             "poses; they are moved to the axle. auto estimates it from how they slip sideways in turns, and takes 0 where that "
+             "does not tell (default: auto)",
+    )  # fmt: skip
+    into.add_argument(
+        "--truth-ahead", type=_ahead, metavar="N",
+        help="the same for the poses of the truth, where it is another point's (default: as --camera-ahead)",
     )  # fmt: skip
     _add_truth(into, "the layout's own, if any")
     into.add_argument(
@@ -146,6 +163,16 @@ def _add_score(commands: Any) -> None:
         help="the clock of the trajectory: source: that of the drive as it was imported; recording: 0 at the recording's start; "
              "auto: recording for files that hippodrome wrote, source for others (default: auto)",
     )  # fmt: skip
+    score.add_argument(
+        "--camera-ahead", type=_metres_ahead, metavar="M",
+        help="how far ahead of the rear axle the camera sits whose trajectory this is; it is then held against the axle's truth "
+             "(default: it is that of the point whose truth was measured)",
+    )  # fmt: skip
+    score.add_argument(
+        "--truth-ahead", type=_ahead, default="auto", metavar="M",
+        help="how far ahead of the rear axle the point lies whose poses --truth has; auto estimates it from how they slip "
+             "sideways in turns (default: auto)",
+    )  # fmt: skip
     _add_truth(score, "the recording's own")
     score.add_argument(
         "--time-offset", type=float, default=0.0, metavar="S", help="seconds to add to the times of --truth (default: 0)"
@@ -192,6 +219,32 @@ def _above_zero(text: str) -> float:
     return value
 
 
+def _offset(text: str) -> float | str:
+    if text == "auto":
+        return text
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) <= 1e11:
+        raise argparse.ArgumentTypeError(f"'{text}' is neither auto nor a number of seconds")
+    return value
+
+
+def _ahead(text: str) -> float | str:
+    return text if text == "auto" else _metres_ahead(text, "auto or ")
+
+
+def _metres_ahead(text: str, or_else: str = "") -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) <= 1e4:
+        raise argparse.ArgumentTypeError(f"'{text}' is not {or_else}a number from -10000 to 10000")
+    return value
+
+
 def _rate(text: str) -> float:
     try:
         value = float(text)
@@ -229,7 +282,8 @@ def import_command(options: argparse.Namespace) -> int:
             source=options.source, kind=options.kind, out=options.out, odometry=options.odometry, truth=options.truth,
             network=options.network, truth_sigma_m=options.truth_sigma, axes=options.axes, truth_frame=options.truth_frame,
             size_px=options.size, fps=options.fps, time_unit=options.time_unit, time_offset_s=options.time_offset_s,
-            calibration=options.calibration, camera_height_m=options.camera_height_m,
+            calibration=options.calibration, camera_height_m=options.camera_height_m, camera_ahead=options.camera_ahead,
+            truth_ahead=options.truth_ahead, topics=tuple(options.topics),
         )
     )  # fmt: skip
     return DONE
@@ -242,7 +296,7 @@ def _score(options: argparse.Namespace) -> int:
         ScoreOptions(
             options.estimate, options.recording, not options.own_frame, options.axes, options.times, options.clock, options.truth,
             options.network, options.truth_sigma, options.time_offset, options.max_gap, options.json, options.max_ape,
-            options.max_rpe,
+            options.max_rpe, options.camera_ahead, options.truth_ahead,
         )
     )  # fmt: skip
     return DONE if held else THRESHOLD_FAILED

@@ -85,6 +85,8 @@ def _about(to: str, conventions: Sequence[str], drives: Sequence[ExportedDrive])
                 "estimates": {method: estimate.frame for method, estimate in drive.estimates.items()},
                 "maps": list(drive.maps),
                 "roads": drive.network is not None,
+                "time_origin_s": drive.origin_ns() / 1e9,
+                "maps_finished": drive.maps_finished,
                 "truth_frame": drive.recording.manifest.get("truth_frame", "network"),
             }
             for drive in drives

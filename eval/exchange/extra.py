@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 
-EXTRA_PACKAGES: Final = ("evo", "foxglove_schemas_protobuf", "mcap", "mcap_protobuf", "rerun", "rosbags")
+EXTRA_PACKAGES: Final = ("evo", "foxglove_schemas_protobuf", "lz4", "mcap", "mcap_protobuf", "rerun", "rosbags", "zstandard")
 
 
 def optional_module(name: str) -> Any:

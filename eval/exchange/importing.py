@@ -16,7 +16,15 @@ from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.folder import new_folder
 from hippodrome.eval.exchange.drives.foreign import ForeignDrive, Motion, motion_of, require_increasing
 from hippodrome.eval.exchange.drives.images import decode
+from hippodrome.eval.exchange.drives.lever import Ahead
 from hippodrome.eval.exchange.drives.new_recording import camera_record, field_of_view_deg, seal, write_frames, write_steps
+from hippodrome.eval.exchange.drives.offset import (
+    TimeOffset,
+    told_offset,
+    turns_of_frames,
+    turns_of_motion,
+    turns_of_trajectory,
+)
 from hippodrome.eval.exchange.drives.plausible import require_plausible
 from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.drives.steps import begin_s, frames_within, steps_of
@@ -39,6 +47,7 @@ READERS: Final = {
     "mcap": ("mcap_file", "read_mcap"),
     "rosbag": ("rosbag", "read_rosbag"),
 }
+LOGS: Final = ("mcap", "rosbag")  # the layouts of messages on topics
 FROM_TRUTH: Final = "truth"  # the value of --odometry that differentiates the truth
 VISUAL: Final = "visual"  # the value of --odometry that looks at the frames
 TruthFrame: TypeAlias = Literal["network", "own"]
@@ -60,9 +69,12 @@ class ImportOptions:
     size_px: tuple[int, int] | None = None  # width and height to scale frames to; None: as they are
     fps: float | None = None  # frames a second, where nothing else says when they were taken
     time_unit: TimeUnit | None = None  # of the file of ``odometry``; None: recognised
-    time_offset_s: float = 0.0  # added to the times of the self-motion
+    time_offset_s: TimeOffset = 0.0  # added to the times of the self-motion; "auto": told by turns
     calibration: Path | None = None  # of the camera
     camera_height_m: float = 1.5  # above the road, for "visual"
+    camera_ahead: Ahead = "auto"  # how far ahead of the rear axle the poses of ``odometry`` lie, in their unit
+    topics: tuple[str, ...] = ()  # those of a log that are used; the others are chosen by their names and types
+    truth_ahead: Ahead | None = None  # the same of the truth's poses; None: as ``camera_ahead``
 
 
 def import_drive(options: ImportOptions) -> None:
@@ -80,10 +92,10 @@ def import_drive(options: ImportOptions) -> None:
     known = _known_truth(options, drive, axes, pose_t_s)
     truth = known.trajectory if known is not None else None
     motion, origin = _motion(options, drive, truth, calibration)
-    if options.time_offset_s:
-        motion = replace(motion, t_s=motion.t_s + options.time_offset_s)
+    if offset_s := _offset_s(options, drive, motion, known, calibration):
+        motion = replace(motion, t_s=motion.t_s + offset_s)
         if options.odometry == FROM_TRUTH and known is not None:
-            known = known.moved(options.time_offset_s)
+            known = known.moved(offset_s)
             truth = known.trajectory
     require_plausible(motion, f"{options.source}: self-motion ({origin})")
     frames = frames_within(drive.frames, motion, options.source)
@@ -104,6 +116,7 @@ def import_drive(options: ImportOptions) -> None:
                 "source": options.source.name,
                 "self_motion": origin,
                 "time_origin_s": begin_s(motion),
+                **({"truth_ahead": known.ahead_m} if known is not None and known.ahead_m else {}),
                 **_intrinsics(calibration, own_px, (width, height)),
             },
             "camera": camera_record(samples, (width, height), fov_deg),
@@ -126,15 +139,18 @@ def import_drive(options: ImportOptions) -> None:
 
 def _read(options: ImportOptions, kind: str, axes: Axes) -> ForeignDrive:
     """The drive as its reader hands it over. Raises HippodromeError."""
+    if options.topics and kind not in LOGS:
+        raise ExchangeError(f"{options.source}: --topic is for {' and '.join(LOGS)}, this is {kind}; leave it out")
     if kind == "images":
         return read_image_folder(options.source, options.fps)
     if kind == "video":
         return read_video(options.source, options.fps)
     if kind == "odometry":
-        return read_bare_odometry(options.source, axes, options.fps, options.time_unit)
+        return read_bare_odometry(options.source, axes, options.fps, options.time_unit, options.camera_ahead)
     name, reader = READERS[kind]
     module = optional_module(f"hippodrome.eval.exchange.readers.{name}")
-    drive: ForeignDrive = getattr(module, reader)(options.source, axes)
+    function: Any = getattr(module, reader)
+    drive: ForeignDrive = function(options.source, axes, options.topics) if kind in LOGS else function(options.source, axes)
     return drive
 
 
@@ -171,12 +187,18 @@ def _intrinsics(
 
 
 def _known_truth(options: ImportOptions, drive: ForeignDrive, axes: Axes, pose_t_s: FloatArray) -> Truth | None:
-    """The truth that the options name, or the layout's own; None where there is none. KITTI's poses have the frames' times."""
+    """The truth that the options name, or the layout's own, of the rear axle; None where there is none.
+
+    KITTI's poses have the frames' times.
+    """
     if options.truth is None:
-        return truth_of_trajectory(drive.truth) if drive.truth is not None else None
-    if options.truth.suffix.lower() == ".txt" and is_kitti_poses(options.truth):
-        return truth_of_trajectory(read_poses(options.truth, axes, pose_t_s, None))
-    return read_truth(options.truth, axes, options.network, options.truth_sigma_m)
+        known = truth_of_trajectory(drive.truth) if drive.truth is not None else None
+    elif options.truth.suffix.lower() == ".txt" and is_kitti_poses(options.truth):
+        known = truth_of_trajectory(read_poses(options.truth, axes, pose_t_s, None))
+    else:
+        known = read_truth(options.truth, axes, options.network, options.truth_sigma_m)
+    said = options.camera_ahead if options.truth_ahead is None else options.truth_ahead
+    return None if known is None else known.at_axle(said, "the truth")
 
 
 def _motion(
@@ -200,7 +222,27 @@ def _motion(
     if given == VISUAL:
         return _seen_motion(options, drive, calibration)
     pose_t_s = drive.pose_t_s if drive.pose_t_s is not None else np.array([frame.t_s for frame in drive.frames])
-    return read_self_motion(Path(given), options.axes or "body", pose_t_s, options.time_unit)
+    return read_self_motion(Path(given), options.axes or "body", pose_t_s, options.time_unit, options.camera_ahead)
+
+
+def _offset_s(
+    options: ImportOptions, drive: ForeignDrive, motion: Motion, known: Truth | None, calibration: Calibration | None
+) -> float:
+    """Seconds to add to the times of the self-motion: as said, or told by the turns of truth or frames, and then printed.
+
+    Raises ExchangeError where they do not tell.
+    """
+    if options.time_offset_s != "auto":
+        return options.time_offset_s
+    if options.odometry in (FROM_TRUTH, VISUAL):
+        raise ExchangeError(f"{options.source}: --time-offset auto needs self-motion with a clock of its own; leave it out")
+    if known is not None and known.has_heading and len(known.trajectory.t_s) > 2:
+        return told_offset(turns_of_motion(motion), turns_of_trajectory(known.trajectory, "the truth"))
+    own_px = _size_of(drive)
+    if own_px is None or len(drive.frames) < 3:
+        raise ExchangeError(f"{options.source}: neither frames nor true headings to tell the time offset by; give it in seconds")
+    undistort = undistorter(calibration, own_px) if calibration else (lambda frame: frame)
+    return told_offset(turns_of_motion(motion), turns_of_frames(drive.frames, undistort))
 
 
 def _seen_motion(options: ImportOptions, drive: ForeignDrive, calibration: Calibration | None) -> tuple[Motion, str]:

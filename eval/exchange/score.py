@@ -13,8 +13,9 @@ import numpy as np
 from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError, Trajectory
 from hippodrome.eval.exchange.drives.errors import ExchangeError
+from hippodrome.eval.exchange.drives.lever import Ahead, at_axle
 from hippodrome.eval.exchange.drives.truth import Truth, read_truth, stored_truth
-from hippodrome.eval.files.spatial import Axes, SpatialPoses, flatten, read_poses
+from hippodrome.eval.files.spatial import Axes, SpatialPoses, flatten, is_own, read_poses
 from hippodrome.eval.methods.materials import RPE_DELTA_M
 from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.eval.metrics.alignment import LABELS, AlignmentName
@@ -50,6 +51,8 @@ class ScoreOptions:
     json_file: Path | None = None
     max_ape_m: float | None = None
     max_rpe_m: float | None = None
+    camera_ahead: float | None = None  # of the trajectory's poses before the rear axle; None: they are of the truth's point
+    truth_ahead: Ahead = "auto"  # of the poses of ``truth``
 
 
 @dataclass(slots=True)
@@ -90,6 +93,7 @@ def score_files(options: ScoreOptions) -> bool:
     drive = open_recording(options.recording)
     sheet = _Sheet()
     truth, same_world = _truth(options, drive, sheet)
+    truth = _of_its_point(options, truth, sheet)
     trajectory, metric, clause = _estimate(options, drive, truth, same_world, sheet)
     at, max_gap_s = _instants(trajectory, truth.trajectory, options.max_gap_s)
 
@@ -138,6 +142,7 @@ def _truth(options: ScoreOptions, drive: Recording, sheet: _Sheet) -> tuple[Trut
             kept = replace(kept, sigma_m=np.full(len(kept.sigma_m), options.truth_sigma_m))
         return kept, drive.manifest.get("truth_frame", "network") == "network"
     found = read_truth(options.truth, options.axes, options.network, options.truth_sigma_m)
+    found = found.at_axle(options.truth_ahead, str(options.truth))
     for note in found.notes:
         sheet.note(note)
     truth = found.moved(options.time_offset_s - _origin_s(drive))
@@ -167,11 +172,28 @@ def _estimate(
         poses = replace(poses, t_s=poses.t_s - origin_s)
         if abs(origin_s) >= LEAST_ORIGIN_S:
             sheet.note(
-                f"{options.estimate}: taken to be in the clock of the drive's source, {origin_s:g} s before the recording's"
+                f"{options.estimate}: taken to be in the clock of the drive's source; the recording begins at {origin_s:.3f} s"
             )
     fitted = not (options.network_frame and same_world)
     trajectory = flatten(poses, truth.in_space() if fitted else None)
-    return trajectory, options.network_frame, _level_clause(poses, trajectory, fitted)
+    clause = _level_clause(poses, trajectory, fitted)
+    if options.camera_ahead:
+        clause += f"; its poses moved back by {options.camera_ahead:g}, to the rear axle"
+    return at_axle(trajectory, options.camera_ahead or 0.0), options.network_frame, clause
+
+
+def _of_its_point(options: ScoreOptions, truth: Truth, sheet: _Sheet) -> Truth:
+    """The truth of the point whose trajectory is scored: the rear axle for maps and what hippodrome wrote.
+
+    Other trajectories are, unless the user says where their camera sits, taken for those of the point whose truth was measured.
+    """
+    if options.camera_ahead is not None or truth.ahead_m == 0.0 or _is_map(options.estimate) or is_own(options.estimate):
+        return truth
+    sheet.note(
+        f"{options.estimate}: taken for poses of the point whose truth was measured, {truth.ahead_m:.2f} ahead of the rear axle "
+        "(--camera-ahead says otherwise; 0: of the axle)"
+    )
+    return truth.as_measured()
 
 
 def _level_clause(poses: SpatialPoses, trajectory: Trajectory, fitted: bool) -> str:

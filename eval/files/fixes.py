@@ -258,7 +258,7 @@ def _oxts(path: Path) -> Iterator[_Fix]:
         raise TrajectoryError(f"{path}: no OXTS data in it (oxts/timestamps.txt, oxts/data/*.txt)")
     times = _text(folder / "timestamps.txt", _bytes(folder / "timestamps.txt")).split("\n")
     for file in sorted((folder / "data").glob("*.txt")):
-        where, number = str(file), int(file.stem) if file.stem.isdigit() else -1
+        where, number = str(file), int(file.stem) if file.stem.isdecimal() else -1
         if not 0 <= number < len(times):
             raise TrajectoryError(f"{where}: no line {number + 1} in timestamps.txt")
         words = _text(file, _bytes(file)).split()
@@ -275,8 +275,8 @@ def _time_s(text: str, where: str) -> float:
         value = float(text)
     except ValueError:
         try:
-            found = datetime.fromisoformat(text[:26] if len(text) > 26 and text[26:].isdigit() else text)
-        except ValueError:
+            found = datetime.fromisoformat(text[:26] if len(text) > 26 and text[26:].isdecimal() else text)
+        except (ValueError, OverflowError):
             raise TrajectoryError(
                 f"{where}: '{text[:40]}' is neither seconds nor a date and time (2026-05-01T12:00:00Z)"
             ) from None
@@ -288,7 +288,7 @@ def _time_s(text: str, where: str) -> float:
 
 
 def _clock_s(word: str, where: str) -> float:
-    if len(word) < 6 or not word[:6].isdigit():
+    if len(word) < 6 or not word[:6].isdecimal():
         raise TrajectoryError(f"{where}: '{word[:20]}' is no time of day (hhmmss)")
     return 3600.0 * int(word[:2]) + 60.0 * int(word[2:4]) + _number(word[4:], where)
 
@@ -322,7 +322,7 @@ def _checksum_holds(line: str) -> bool:
 def _number(text: Any, where: str) -> float:
     try:
         return float(text)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         raise TrajectoryError(f"{where}: '{str(text)[:40]}' is not a number") from None
 
 

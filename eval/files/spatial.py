@@ -15,7 +15,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.files.trajectories import HEAD, MAX_BYTES
+from hippodrome.eval.files.directions import angle_deg, chords, turn_up
+from hippodrome.eval.files.rows import row_of_numbers, text_lines
+from hippodrome.eval.files.trajectories import HEAD
 from hippodrome.eval.metrics.alignment import DegenerateAlignment, umeyama
 from hippodrome.eval.metrics.association import TrajectoryError
 
@@ -26,7 +28,8 @@ LEVEL_FROM_DEG: Final = (
 )
 AGREE_DEG: Final = 25.0  # a plane farther than this from what the attitudes call up is not the ground
 MIN_WIDTH: Final = 0.1  # least width of a drive, as a share of its length, at which a plane can be laid on it
-CHORDS: Final = 200  # directions of motion are told over this share of the drive: single steps are noise
+FARTHEST: Final = 1e9  # a position in any unit of length; the equator has 4e7 m
+BENT: Final = 0.05  # how far a rotation's columns may be from orthonormal ones: writers round
 SURE: Final = 0.9  # length of the mean direction of motion, from 0 (all ways) to 1, from which one may speak of one
 
 
@@ -51,7 +54,7 @@ def read_poses(path: Path, axes: Axes | None = None, times: Path | None = None) 
     Raises:
         TrajectoryError: The file is not such poses, or contradicts itself; the message names file, line and cure.
     """
-    lines = _lines(path)
+    lines = text_lines(path)
     rows = [(n, line.split()) for n, line in enumerate(lines, start=1) if line.strip() and not line.lstrip().startswith("#")]
     if not rows:
         raise TrajectoryError(f"{path}: no poses")
@@ -60,17 +63,50 @@ def read_poses(path: Path, axes: Axes | None = None, times: Path | None = None) 
         raise TrajectoryError(
             f"{path}: line {rows[0][0]}: {width} columns, expected 8 (TUM: t x y z qx qy qz qw) or 12 (KITTI, with --times)"
         )
-    table = np.array([_numbers(path, number, words, width) for number, words in rows])
+    table = np.array([row_of_numbers(path, number, words, width) for number, words in rows])
     if width == 12:
         found = _kitti(path, table, axes or "camera", times)
     else:
         found = _tum(path, table, axes or "body", bool(lines) and lines[0].startswith(HEAD))
-    found = _in_order(path, found)
+    return believed(str(path), found)
+
+
+def is_own(path: Path) -> bool:
+    """Whether hippodrome wrote this file of poses; its poses are the rear axle's. Raises TrajectoryError if it cannot be read."""
+    lines = text_lines(path)
+    return bool(lines) and lines[0].startswith(HEAD)
+
+
+def believed(name: str, poses: SpatialPoses) -> SpatialPoses:
+    """The poses without rows that repeat a time; with the direction of motion in place of attitudes that are but a filler.
+
+    Args:
+        name: How errors and notes name the poses.
+        poses: As they were read. Those that hippodrome wrote are not asked whether they contradict themselves.
+
+    Raises:
+        TrajectoryError: They are not finite, not in order of time, or contradict themselves.
+    """
+    found = _in_order(name, poses)
+    if (far := np.abs(found.positions).max(axis=1) > FARTHEST).any():
+        raise TrajectoryError(f"{name}: sample {int(np.flatnonzero(far)[0])}: a position beyond {FARTHEST:g}; check the columns")
+    with np.errstate(all="ignore"):
+        squares = np.einsum("nji,njk->nik", found.rotations, found.rotations) - np.eye(3)
+        bent = ~(np.abs(squares).max(axis=(1, 2)) <= BENT) | ~(np.linalg.det(found.rotations) > 0.0)
+    if bent.any():
+        raise TrajectoryError(f"{name}: sample {int(np.flatnonzero(bent)[0])}: its attitude is no rotation; check the columns")
     if found.own:
         return found
-    found = _with_course(path, found)
-    _check(path, found)
+    found = _with_course(name, found)
+    _check(name, found)
     return found
+
+
+def axes_driven(poses: SpatialPoses) -> Axes | None:
+    """Whose axes the attitudes turn, by the way they move: "body" along x, "camera" along z; None where that does not tell."""
+    forward = motion_in_body(poses)
+    found: dict[int, Axes] = {0: "body", 2: "camera"}
+    return found.get(int(np.argmax(np.abs(forward)))) if np.linalg.norm(forward) > SURE else None
 
 
 def flatten(poses: SpatialPoses, truth: SpatialPoses | None = None) -> Trajectory:
@@ -90,14 +126,14 @@ def flatten(poses: SpatialPoses, truth: SpatialPoses | None = None) -> Trajector
 def level(poses: SpatialPoses) -> FloatArray:
     """The rotation (3, 3) that turns the ground of these poses level; the identity where z is up already."""
     up = _up(poses)
-    if _angle_deg(up, np.array([0.0, 0.0, 1.0])) < LEVEL_FROM_DEG:
+    if angle_deg(up, np.array([0.0, 0.0, 1.0])) < LEVEL_FROM_DEG:
         return np.eye(3)
     centred = poses.positions - poses.positions.mean(axis=0)
     _, spread, directions = np.linalg.svd(centred, full_matrices=False)
     if len(spread) == 3 and spread[1] > MIN_WIDTH * spread[0] and spread[2] < 0.5 * spread[1]:
         normal = directions[2] if directions[2] @ up > 0.0 else -directions[2]
-        up = normal if _angle_deg(normal, up) < AGREE_DEG else up
-    return _turn_up(up)
+        up = normal if angle_deg(normal, up) < AGREE_DEG else up
+    return turn_up(up)
 
 
 def level_to(poses: SpatialPoses, truth: SpatialPoses) -> FloatArray:
@@ -117,12 +153,12 @@ def level_to(poses: SpatialPoses, truth: SpatialPoses) -> FloatArray:
         turn = umeyama(poses.positions[inside], target, with_scale=True).rotation
     except DegenerateAlignment:
         return own
-    return turn if _angle_deg(turn @ _up(poses), np.array([0.0, 0.0, 1.0])) < AGREE_DEG else own
+    return turn if angle_deg(turn @ _up(poses), np.array([0.0, 0.0, 1.0])) < AGREE_DEG else own
 
 
 def motion_in_body(poses: SpatialPoses) -> FloatArray:
     """The mean direction of motion (3,) in the axes of the moving frame: of length 1 where it is always the same."""
-    first, second = _chords(poses.positions)
+    first, second = chords(poses.positions)
     if len(first) == 0:
         return np.zeros(3)
     along = poses.positions[second] - poses.positions[first]
@@ -158,33 +194,7 @@ def _is_planar(poses: SpatialPoses) -> bool:
     return bool(np.ptp(poses.positions[:, 2]) == 0.0 and np.abs(poses.rotations[:, 2, :2]).max() < 1e-9)
 
 
-def _chords(positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """First and second numbers of samples that lie a share of the drive's length apart."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
-    if along[-1] <= 0.0:
-        return np.zeros(0, int), np.zeros(0, int)
-    marks = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], CHORDS + 1)).clip(0, len(along) - 1))
-    first, second = marks[:-1], marks[1:]
-    moved = np.linalg.norm(positions[second] - positions[first], axis=1) > 0.0
-    return first[moved], second[moved]
-
-
-def _turn_up(up: FloatArray) -> FloatArray:
-    """The smallest rotation (3, 3) that takes the unit vector ``up`` to z."""
-    axis = np.cross(up, [0.0, 0.0, 1.0])
-    sine = float(np.linalg.norm(axis))
-    if sine < 1e-12:
-        return np.eye(3) if up[2] > 0.0 else np.diag([1.0, -1.0, -1.0])
-    turn: FloatArray = Rotation.from_rotvec(axis / sine * np.arctan2(sine, up[2])).as_matrix()
-    return turn
-
-
-def _angle_deg(a: FloatArray, b: FloatArray) -> float:
-    cosine = float(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)))
-    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
-
-
-def _with_course(path: Path, poses: SpatialPoses) -> SpatialPoses:
+def _with_course(name: str, poses: SpatialPoses) -> SpatialPoses:
     """The poses themselves; or, where all attitudes are one that the motion contradicts, with the direction of motion as heading.
 
     Many write positions alone as TUM, with 0 0 0 1 in the place of the attitude.
@@ -198,23 +208,23 @@ def _with_course(path: Path, poses: SpatialPoses) -> SpatialPoses:
         return poses
     last = moving[np.clip(np.searchsorted(moving, np.arange(len(steps)), side="right") - 1, 0, None)]
     course = np.arctan2(steps[last, 1], steps[last, 0])
-    note = f"{path}: its attitudes never change, so headings are taken from the direction of motion"
+    note = f"{name}: its attitudes never change, so headings are taken from the direction of motion"
     return SpatialPoses(poses.t_s, poses.positions, Rotation.from_euler("z", course[:, None]).as_matrix(), "body", False,
                         (*poses.notes, note))  # fmt: skip
 
 
-def _check(path: Path, poses: SpatialPoses) -> None:
+def _check(name: str, poses: SpatialPoses) -> None:
     """Raise TrajectoryError if the poses look like degrees, like another order of columns or like other axes."""
     t_s, xy = poses.t_s, poses.positions[:, :2]
     if len(t_s) > 1 and np.median(np.diff(t_s)) > 1e4:
-        raise TrajectoryError(f"{path}: its poses lie {np.median(np.diff(t_s)):.3g} s apart: the times look like nanoseconds; "
+        raise TrajectoryError(f"{name}: its poses lie {np.median(np.diff(t_s)):.3g} s apart: the times look like nanoseconds; "
                               "divide them by 1e9")  # fmt: skip
     extent = float(np.hypot(*np.ptp(xy, axis=0)))
     away = float(np.abs(np.median(xy, axis=0)).max())
     degrees = (np.abs(xy).min(axis=1) <= 90.0).all() and (np.abs(xy) <= 180.0).all()
     if degrees and len(t_s) > 2 and 1e-5 < extent < 1.0 and away > max(1.0, 10.0 * extent):
         raise TrajectoryError(
-            f"{path}: x and y look like latitude and longitude in degrees (all within {extent:.2g} of one another); give a table "
+            f"{name}: x and y look like latitude and longitude in degrees (all within {extent:.2g} of one another); give a table "
             "with named columns (t_s,lat,lon), GPX or NMEA, and --network, so that they are projected"
         )
     forward = motion_in_body(poses)
@@ -224,31 +234,31 @@ def _check(path: Path, poses: SpatialPoses) -> None:
     lost, lost_other = 1.0 - abs(forward[_AHEAD[poses.axes]]), 1.0 - abs(other[_AHEAD[poses.axes]])
     if lost_other < 0.02 and lost > 10.0 * lost_other + 0.002:
         raise TrajectoryError(
-            f"{path}: heading and direction of motion disagree, and would agree if the attitude were written qw qx qy qz; "
+            f"{name}: heading and direction of motion disagree, and would agree if the attitude were written qw qx qy qz; "
             "put its columns into the order qx qy qz qw"
         )
     main = int(np.argmax(np.abs(forward)))
     if np.linalg.norm(forward) > SURE and main != _AHEAD[poses.axes]:
         cure = {0: "give --axes body", 2: "give --axes camera"}.get(main, "turn the attitudes so that x points forward")
-        raise TrajectoryError(f"{path}: the poses drive along their {'xyz'[main]} axis, not along {poses.axes} axes; {cure}")
+        raise TrajectoryError(f"{name}: the poses drive along their {'xyz'[main]} axis, not along {poses.axes} axes; {cure}")
 
 
 _AHEAD: Final = {"body": 0, "camera": 2}
 
 
-def _in_order(path: Path, poses: SpatialPoses) -> SpatialPoses:
-    for name, values in (("time", poses.t_s), ("position", poses.positions), ("attitude", poses.rotations)):
+def _in_order(name: str, poses: SpatialPoses) -> SpatialPoses:
+    for what, values in (("time", poses.t_s), ("position", poses.positions), ("attitude", poses.rotations)):
         if not np.isfinite(values).all():
             bad = int(np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))[0])
-            raise TrajectoryError(f"{path}: sample {bad}: its {name} is not finite")
+            raise TrajectoryError(f"{name}: sample {bad}: its {what} is not finite")
     steps = np.diff(poses.t_s)
     if (steps < 0.0).any():
         bad = int(np.flatnonzero(steps < 0.0)[0]) + 1
-        raise TrajectoryError(f"{path}: time {poses.t_s[bad]} of sample {bad} does not increase; sort the rows by time")
+        raise TrajectoryError(f"{name}: time {poses.t_s[bad]} of sample {bad} does not increase; sort the rows by time")
     kept = np.concatenate([[True], steps > 0.0])
     if kept.all():
         return poses
-    note = f"{path}: {int((~kept).sum())} row(s) with the time of the one before are left out"
+    note = f"{name}: {int((~kept).sum())} row(s) with the time of the one before are left out"
     return SpatialPoses(
         poses.t_s[kept], poses.positions[kept], poses.rotations[kept], poses.axes, poses.own, (*poses.notes, note)
     )
@@ -265,7 +275,7 @@ def _tum(path: Path, table: FloatArray, axes: Axes, own: bool) -> SpatialPoses:
 def _kitti(path: Path, table: FloatArray, axes: Axes, times: Path | None) -> SpatialPoses:
     if times is None:
         raise TrajectoryError(f"{path}: 12 columns, poses of KITTI, have no times; give --times FILE, a time in seconds a line")
-    stamps = [line.split()[0] for line in _lines(times) if line.strip() and not line.lstrip().startswith("#")]
+    stamps = [line.split()[0] for line in text_lines(times) if line.strip() and not line.lstrip().startswith("#")]
     if len(stamps) != len(table):
         raise TrajectoryError(f"{times}: {len(stamps)} times for the {len(table)} poses of {path}")
     try:
@@ -274,21 +284,3 @@ def _kitti(path: Path, table: FloatArray, axes: Axes, times: Path | None) -> Spa
         raise TrajectoryError(f"{times}: {error}") from None
     matrices = table.reshape(-1, 3, 4)
     return SpatialPoses(t_s, matrices[:, :, 3], matrices[:, :, :3], axes)
-
-
-def _lines(path: Path) -> list[str]:
-    try:
-        if (size := path.stat().st_size) > MAX_BYTES:
-            raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
-        return path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise TrajectoryError(f"{path}: cannot be read as text: {error}") from None
-
-
-def _numbers(path: Path, number: int, words: list[str], width: int) -> list[float]:
-    if len(words) != width:
-        raise TrajectoryError(f"{path}: line {number}: {len(words)} columns, the lines before have {width}")
-    try:
-        return [float(word) for word in words]
-    except ValueError as error:
-        raise TrajectoryError(f"{path}: line {number}: {error}") from None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -23,6 +23,8 @@ from hippodrome.sim.recording import MANIFEST, Recording, open_recording
 TRUTH = {"mapping": "ground-truth", "localization": "localization-ground-truth"}  # stem of the truth's file, by drive
 LOCALIZED = "-localization"  # end of the stems of estimates that belong to the localization drive
 DEAD_RECKONING = "dead-reckoning"
+CELLS = "cells"  # the folder of a sweep that has those of its cells
+LATEST_S = 4e9  # seconds since 1970 beyond which a clock's stamps do not fit into those of ROS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,10 +46,20 @@ class ExportedDrive:
     maps: dict[str, CognitiveMap]  # by the stem of the map's file
     network: RoadNetwork | None  # None: its file was not found
     network_file: Path | None = None
+    # Of the drive that the maps were made on, where that is another one, and they were finished before this one began.
+    map_truth: Trajectory | None = None
+    maps_finished: bool = False
+
+    def origin_ns(self) -> int:
+        """When the recording's clock begins in that of its source, whole nanoseconds; 0 of ours, and where that is no stamp."""
+        imported = self.recording.manifest.get("imported")
+        value = imported.get("time_origin_s", 0.0) if isinstance(imported, dict) else 0.0
+        plausible = isinstance(value, int | float) and 0.0 < value < LATEST_S
+        return round(value * 1e9) if plausible else 0
 
 
 def gather_drives(folder: Path, network: Path | None) -> list[ExportedDrive]:
-    """The drives of a recording, of a scenario's results or of a whole run.
+    """The drives of a recording, of a scenario's results, of a whole run or of a sweep.
 
     Args:
         folder: The folder of one of these.
@@ -59,6 +71,17 @@ def gather_drives(folder: Path, network: Path | None) -> list[ExportedDrive]:
     if (folder / MANIFEST).exists():
         recording = open_recording(folder)
         return [_drive(folder.name, recording, {}, {}, network or _network_file(recording, folder.parent.parent))]
+    if (folder / CELLS).is_dir():
+        return [
+            replace(drive, name=f"{cell.name}-{drive.name}")
+            for cell in sorted(_folders(folder / CELLS))
+            for drive in _drives_below(cell, network)
+        ]
+    return _drives_below(folder, network)
+
+
+def _drives_below(folder: Path, network: Path | None) -> list[ExportedDrive]:
+    """The drives of a scenario's results or of a whole run. Raises HippodromeError if it is neither."""
     scenarios = [folder] if _is_scenario(folder) else sorted(path for path in _folders(folder) if _is_scenario(path))
     if not scenarios:
         raise ExchangeError(
@@ -85,7 +108,10 @@ def _scenario_drives(folder: Path, network: Path | None) -> Iterator[ExportedDri
         recording = _recording_of(truth, root, f"{folder.name}-{role}-*")
         mine = {name: value for name, value in estimates.items() if _role_of(name) == role and name not in TRUTH.values()}
         name, roads = f"{folder.name}-{role}", network or _network_file(recording, root)
-        yield _drive(name, recording, mine, maps, roads)
+        drive = _drive(name, recording, mine, maps, roads)
+        if role == "localization":
+            drive = replace(drive, map_truth=estimates.get(TRUTH["mapping"]), maps_finished=True)
+        yield drive
 
 
 def _drive(

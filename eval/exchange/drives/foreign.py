@@ -10,7 +10,8 @@ import numpy as np
 from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.exchange.drives.errors import ExchangeError
-from hippodrome.eval.exchange.drives.poses import Axes, planar, rotations
+from hippodrome.eval.exchange.drives.poses import Axes, rotations
+from hippodrome.eval.files.spatial import SpatialPoses, axes_driven, believed, flatten
 from hippodrome.eval.metrics.association import MAX_GAP_S
 
 MIN_NORM, MAX_NORM = 0.5, 1.5  # limits of a unit quaternion's norm: writers round
@@ -46,7 +47,9 @@ class ForeignDrive:
     truth_lat_lon: FloatArray | None = None  # (N, 3) seconds, latitude, longitude in degrees, where the layout has fixes
 
 
-def trajectory_of(t_s: FloatArray, positions: FloatArray, quaternions_xyzw: FloatArray, axes: Axes, name: str) -> Trajectory:
+def trajectory_of(
+    t_s: FloatArray, positions: FloatArray, quaternions_xyzw: FloatArray, axes: Axes, name: str, other_axes: bool = False
+) -> Trajectory:
     """Planar poses of poses in space.
 
     Args:
@@ -55,6 +58,7 @@ def trajectory_of(t_s: FloatArray, positions: FloatArray, quaternions_xyzw: Floa
         quaternions_xyzw: Attitudes (N, 4), each of a norm near 1.
         axes: What the attitude turns: the vehicle's axes (x forward) or a camera's (z forward).
         name: How errors name the poses.
+        other_axes: As of ``level_trajectory``.
 
     Raises:
         ExchangeError: A quaternion is far from a unit one, or the times do not increase.
@@ -63,13 +67,36 @@ def trajectory_of(t_s: FloatArray, positions: FloatArray, quaternions_xyzw: Floa
     if not ((norm > MIN_NORM) & (norm < MAX_NORM)).all():
         bad = int(np.flatnonzero(~((norm > MIN_NORM) & (norm < MAX_NORM)))[0])
         raise ExchangeError(f"{name}: pose {bad} has no unit quaternion")
-    return with_increasing_times(Trajectory(t_s, planar(positions, rotations(quaternions_xyzw), axes)), name)
+    return level_trajectory(t_s, positions, rotations(quaternions_xyzw), axes, name, other_axes)
 
 
-def with_increasing_times(trajectory: Trajectory, name: str) -> Trajectory:
-    """The trajectory itself. Raises ExchangeError if its times do not increase."""
-    require_increasing(trajectory.t_s, name)
-    return trajectory
+def level_trajectory(
+    t_s: FloatArray, positions: FloatArray, rotation: FloatArray, axes: Axes, name: str, other_axes: bool = False
+) -> Trajectory:
+    """Planar poses of poses in space: turned so that the ground is level, then height, roll and pitch are dropped.
+
+    Rows that repeat the time of the one before are left out. That and what else was done to them is printed.
+
+    Args:
+        t_s: Times (N,).
+        positions: Positions (N, 3) in a world whose z is up but for a tilt.
+        rotation: Attitudes (N, 3, 3).
+        axes: What the attitude turns.
+        name: How errors name the poses.
+        other_axes: Whether poses whose motion contradicts ``axes`` are taken for those of the other ones: of a layout's truth
+            where ``axes`` was said of another file.
+
+    Raises:
+        HippodromeError: The poses are not finite, not in order of time, or contradict themselves.
+    """
+    given = SpatialPoses(t_s, positions, rotation, axes)
+    if other_axes and (driven := axes_driven(given)) not in (None, axes):
+        print(f"note: {name}: the motion says that its poses are of {driven} axes, not of {axes} axes; they are taken so")
+        given = SpatialPoses(t_s, positions, rotation, driven or axes)
+    poses = believed(name, given)
+    for note in poses.notes:
+        print(f"note: {note}")
+    return flatten(poses)
 
 
 def require_increasing(t_s: FloatArray, name: str) -> None:

@@ -6,7 +6,7 @@ scored at these where it is the sparser one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +15,7 @@ import numpy as np
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.exported import truth_of
+from hippodrome.eval.exchange.drives.lever import NO_LEVER, Ahead, at_axle, lever_of
 from hippodrome.eval.files.fixes import is_fix_file, read_fixes
 from hippodrome.eval.files.spatial import Axes, SpatialPoses, flatten, level, lifted, read_poses
 from hippodrome.sim.georeference import GeoReference, read_georeference
@@ -34,6 +35,7 @@ class Truth:
     has_heading: bool  # False: fixes; the heading is the direction to the next one, too rough to be scored
     in_network: bool  # whether it was projected into a road network's frame
     notes: tuple[str, ...] = ()
+    ahead_m: float = 0.0  # how far ahead of the rear axle the point lies that was measured; the trajectory is the axle's
 
     def in_space(self) -> SpatialPoses:
         """The poses with their heights, z up."""
@@ -42,8 +44,20 @@ class Truth:
 
     def moved(self, seconds: float) -> Truth:
         """The same, ``seconds`` later."""
-        trajectory = Trajectory(self.trajectory.t_s + seconds, self.trajectory.poses)
-        return Truth(trajectory, self.height_m, self.sigma_m, self.has_heading, self.in_network, self.notes)
+        return replace(self, trajectory=Trajectory(self.trajectory.t_s + seconds, self.trajectory.poses))
+
+    def at_axle(self, said: Ahead, name: str) -> Truth:
+        """The truth of the rear axle, from that of a point ahead of it; ``said`` and ``name`` are those of ``lever_of``.
+
+        Fixes, which have no heading, stay where they are.
+        """
+        lever = lever_of(self.trajectory, said, name) if self.has_heading else NO_LEVER
+        notes = (*self.notes, lever.words) if lever.words else self.notes
+        return replace(self, trajectory=at_axle(self.trajectory, lever.ahead), notes=notes, ahead_m=lever.ahead)
+
+    def as_measured(self) -> Truth:
+        """The truth of the point that was measured."""
+        return replace(self, trajectory=at_axle(self.trajectory, -self.ahead_m), ahead_m=0.0)
 
 
 def read_truth(path: Path, axes: Axes | None, network: Path | None, sigma_m: float | None = None) -> Truth:
@@ -61,8 +75,7 @@ def read_truth(path: Path, axes: Axes | None, network: Path | None, sigma_m: flo
     found = _fixes(path, network) if is_fix_file(path) else _poses(path, axes)
     if sigma_m is None:
         return found
-    sigma = np.full(len(found.sigma_m), sigma_m)
-    return Truth(found.trajectory, found.height_m, sigma, found.has_heading, found.in_network, found.notes)
+    return replace(found, sigma_m=np.full(len(found.sigma_m), sigma_m))
 
 
 def truth_of_trajectory(trajectory: Trajectory) -> Truth:
@@ -102,7 +115,7 @@ def stored_truth(recording: Recording) -> Truth | None:
     path = recording.folder / TRUTH_FILE
     if TRUTH_FILE not in recording.manifest.get("sha256", {}):
         steps = truth_of(recording)
-        return None if steps is None else truth_of_trajectory(steps)
+        return None if steps is None else replace(truth_of_trajectory(steps), ahead_m=_ahead_m(recording))
     try:
         arrays = read_arrays(path, ["t_s", "poses_m", "height_m", "sigma_m", "has_heading"])
     except (OSError, KeyError, ValueError, EOFError) as error:
@@ -111,7 +124,15 @@ def stored_truth(recording: Recording) -> Truth | None:
     if arrays["poses_m"].shape != (count, 3) or arrays["height_m"].shape != (count,) or arrays["sigma_m"].shape != (count,):
         raise RecordingError(f"{path}: its arrays do not fit together; import the drive anew")
     trajectory = Trajectory(arrays["t_s"], arrays["poses_m"])
-    return Truth(trajectory, arrays["height_m"], arrays["sigma_m"], bool(arrays["has_heading"][0]), False)
+    heading, ahead_m = bool(arrays["has_heading"][0]), _ahead_m(recording)
+    return Truth(trajectory, arrays["height_m"], arrays["sigma_m"], heading, False, ahead_m=ahead_m)
+
+
+def _ahead_m(recording: Recording) -> float:
+    """How far ahead of the rear axle the point lies whose truth was imported; 0 where nothing is said of it."""
+    imported = recording.manifest.get("imported")
+    value = imported.get("truth_ahead", 0.0) if isinstance(imported, dict) else 0.0
+    return float(value) if isinstance(value, int | float) and np.isfinite(value) else 0.0
 
 
 def _poses(path: Path, axes: Axes | None) -> Truth:

@@ -20,6 +20,7 @@ from hippodrome.eval.exchange.drives.camera import (
 from hippodrome.eval.exchange.drives.exported import ExportedDrive
 from hippodrome.eval.exchange.drives.poses import nanoseconds, quaternions
 from hippodrome.eval.exchange.drives.tables import flat, write_rows
+from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.render.camera import CameraSpec
 
@@ -27,7 +28,8 @@ CONVENTIONS = (
     "time: whole nanoseconds from the start of the drive",
     "poses: rear axle (x forward, y left, z up), metres, road network's frame; quaternion w x y z; printed to read back exactly",
     "cam0/data (right: cam1/data): PNG as recorded, bit for bit",
-    "odometry0: self-motion as sensed, map units; estimates/METHOD.csv: topometric* as above, others in map units from own start",
+    "odometry0: self-motion as sensed, map units; estimates/METHOD.csv, .tum: topometric* as above, others in map units from own "
+    "start",
 )
 HEAD = (
     "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z [],"
@@ -55,6 +57,7 @@ def _write_sequence(drive: ExportedDrive, here: Path) -> None:
         _write_yaml(sensor / "sensor.yaml", {"sensor_type": "visual-inertial", "T_BS": _matrix(np.eye(4))})
     for method, estimate in drive.estimates.items():
         _write_states(here / "estimates" / f"{method}.csv", estimate.trajectory)
+        write_tum(here / "estimates" / f"{method}.tum", estimate.trajectory)  # evo takes estimates beside EuRoC's truth so
 
 
 def _write_cameras(recording: Recording, here: Path) -> None:

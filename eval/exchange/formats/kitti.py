@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
 from hippodrome.eval.exchange.drives.camera import (
@@ -31,6 +32,7 @@ CONVENTIONS = (
     "poses: left camera (x right, y down, z forward) in its own first true pose; metres; 12 numbers printed to read back exactly",
     "sequences/NN/origin.txt: that first pose (4x4) in the road network's frame",
     "estimates/METHOD/NN.txt with NN-times.txt: topometric* as above; others: rear axle, map units, from own start",
+    "poses/NN.tum, estimates/METHOD/NN.tum: the same with their times, for evo_ape tum, as estimates have times of their own",
     "image_2 (right: image_3): colour as recorded, bit for bit; image_0 (right: image_1): the same in grey",
 )
 
@@ -58,6 +60,7 @@ def _write_sequence(drive: ExportedDrive, folder: Path, number: str) -> None:
         origin = cameras[0]
         write_rows(here / "origin.txt", origin)
         _write_poses(folder / "poses" / f"{number}.txt", np.linalg.inv(origin) @ cameras)
+        _write_timed(folder / "poses" / f"{number}.tum", drive.truth.t_s[at_frames], np.linalg.inv(origin) @ cameras)
         if not np.isin(t_s, drive.truth.t_s).all():  # truth of a part: KITTI has no place to say which
             write_rows(here / "truth_times.txt", ((t,) for t in drive.truth.t_s[at_frames]))
     for method, estimate in drive.estimates.items():
@@ -65,6 +68,7 @@ def _write_sequence(drive: ExportedDrive, folder: Path, number: str) -> None:
         found = _in_camera(estimate.trajectory, origin, in_body) if placed else _from_own_start(estimate.trajectory)
         _write_poses(folder / "estimates" / method / f"{number}.txt", found)
         write_rows(folder / "estimates" / method / f"{number}-times.txt", ((t,) for t in estimate.trajectory.t_s))
+        _write_timed(folder / "estimates" / method / f"{number}.tum", estimate.trajectory.t_s, found)
 
 
 def _in_camera(trajectory: Trajectory, origin: FloatArray | None, in_body: FloatArray) -> FloatArray:
@@ -86,6 +90,14 @@ def _from_own_start(trajectory: Trajectory) -> FloatArray:
 
 def _write_poses(path: Path, poses: FloatArray) -> None:
     write_rows(path, (flat(pose[:3]) for pose in poses))
+
+
+def _write_timed(path: Path, t_s: FloatArray, poses: FloatArray) -> None:
+    """Write the same poses as TUM, with their times: evo compares KITTI's only where both files have the same number of them."""
+    turns = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+    write_rows(
+        path, ((float(t), *map(float, pose[:3, 3]), *map(float, turn)) for t, pose, turn in zip(t_s, poses, turns, strict=True))
+    )
 
 
 def _write_calibration(path: Path, camera: CameraSpec) -> None:

@@ -38,6 +38,7 @@ from hippodrome.eval.exchange.drives.scene import (
     CAMERA_FRAME,
     NETWORK_FRAME,
     VEHICLE_FRAME,
+    colour_of,
     frame_id,
     growth,
     lanes,
@@ -47,10 +48,11 @@ from hippodrome.eval.exchange.drives.scene import (
 from hippodrome.eval.methods.stages import dead_reckoning
 
 CONVENTIONS = (
-    "messages: Foxglove's protobuf schemas; log time: whole nanoseconds from the start of the drive; poses: doubles, exact",
+    "messages: Foxglove's protobuf schemas; log time: whole nanoseconds from the start of the drive (of an imported one: of "
+    "its source's clock); poses: doubles, exact",
     "frames: network (metres, road network's) -> vehicle (rear axle) -> camera; own/METHOD: map units, laid on the true start",
     "/camera: PNG as recorded; /self_motion: as sensed, map units/s; /estimate/METHOD, /map/NAME, /network: what was found",
-    "maps grow in steps of 5 s; their vertices lie where the finished map has them",
+    "maps grow in steps of 5 s, their vertices where the finished map has them; a localization drive has them whole from 0 s on",
 )
 IMAGE, RIGHT_IMAGE, SELF_MOTION, TRUTH = "/camera", "/camera_right", "/self_motion", "/ground_truth"
 
@@ -58,7 +60,6 @@ Event: TypeAlias = tuple[int, int, str, Any]  # nanoseconds, order among equals,
 
 ROAD: Final = Color(r=0.6, g=0.6, b=0.65, a=1.0)
 CLOSURE: Final = Color(r=0.95, g=0.55, b=0.15, a=1.0)
-MAP: Final = Color(r=0.1, g=0.45, b=0.85, a=1.0)
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
@@ -66,7 +67,10 @@ def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
     for drive in drives:
         with (folder / f"{drive.name}.mcap").open("wb") as stream, Writer(stream) as writer:
             for stamp, _, topic, message in heapq.merge(*_streams(drive), key=lambda event: event[:2]):
-                writer.write_message(topic, message, log_time=stamp, publish_time=stamp)
+                moment = stamp + drive.origin_ns()
+                if moment != stamp:
+                    _set_time(message, moment)
+                writer.write_message(topic, message, log_time=moment, publish_time=moment)
 
 
 def _streams(drive: ExportedDrive) -> list[Iterable[Event]]:
@@ -140,9 +144,10 @@ def _vehicle(truth: Trajectory) -> Iterator[tuple[int, str, Any]]:
 
 def _map(drive: ExportedDrive, name: str) -> Iterator[tuple[int, str, Any]]:
     frame = map_frame_id(name, drive.maps[name])
-    for state in growth(drive.maps[name]):
+    red, green, blue = (value / 255 for value in colour_of(name))
+    for state in growth(drive, name):
         stamp = _stamp(state.t_s)
-        lines = [_line(state.path, MAP, 0.8)]
+        lines = [_line(state.path, Color(r=red, g=green, b=blue, a=1.0), 0.8)]
         if len(state.closures):
             lines.append(_line(state.closures.reshape(-1, 2), CLOSURE, 0.4, LinePrimitive.LINE_LIST))
         yield stamp, f"/map/{name}", _scene(stamp, frame, name, lines)
@@ -179,6 +184,12 @@ def _vector(xyz: FloatArray) -> Vector3:
 
 def _quaternion(xyzw: FloatArray) -> Quaternion:
     return Quaternion(x=xyzw[0], y=xyzw[1], z=xyzw[2], w=xyzw[3])
+
+
+def _set_time(message: Any, stamp: int) -> None:
+    """Give a message another time."""
+    for dated in message.entities if isinstance(message, SceneUpdate) else [message]:
+        dated.timestamp.CopyFrom(_time(stamp))
 
 
 def _stamp(t_s: float) -> int:

@@ -21,6 +21,7 @@ from hippodrome.eval.exchange.drives.scene import (
     CAMERA_FRAME,
     NETWORK_FRAME,
     VEHICLE_FRAME,
+    colour_of,
     frame_id,
     growth,
     lanes,
@@ -36,7 +37,7 @@ CONVENTIONS = (
 )
 APPLICATION, TIMELINE, ROOT = "hippodrome", "drive", NETWORK_FRAME
 CAMERA = f"{ROOT}/{VEHICLE_FRAME}/{CAMERA_FRAME}"
-ROAD, MAP, CLOSURE = (150, 150, 165), (25, 115, 217), (242, 140, 38)
+ROAD, CLOSURE, TRUTH = (150, 150, 165), (242, 140, 38), (220, 220, 220)
 
 
 def write(drives: Sequence[ExportedDrive], folder: Path) -> None:
@@ -94,14 +95,16 @@ def _log_poses(stream: rr.RecordingStream, frame: str, name: str, trajectory: Tr
     places = _raised(trajectory.poses[:, :2])
     columns = rr.Transform3D.columns(translation=places, quaternion=quaternions(trajectory.poses))
     stream.send_columns(entity_of(frame, name), indexes=[_times(trajectory.t_s)], columns=columns)
-    stream.log(entity_of(frame, f"path/{name}"), rr.LineStrips3D([places]), static=True)
+    method = name.removeprefix("estimate/")
+    colour = TRUTH if method == name else colour_of(method)
+    stream.log(entity_of(frame, f"path/{name}"), rr.LineStrips3D([places], colors=colour), static=True)
 
 
 def _log_map(stream: rr.RecordingStream, drive: ExportedDrive, name: str) -> None:
     entity = entity_of(map_frame_id(name, drive.maps[name]), f"map/{name}")
-    for state in growth(drive.maps[name]):
+    for state in growth(drive, name):
         stream.set_time(TIMELINE, duration=state.t_s)
-        stream.log(entity, rr.LineStrips3D([_raised(state.path)], colors=MAP))
+        stream.log(entity, rr.LineStrips3D([_raised(state.path)], colors=colour_of(name)))
         stream.log(f"{entity}/closures", rr.LineStrips3D([_raised(ends) for ends in state.closures], colors=CLOSURE))
 
 

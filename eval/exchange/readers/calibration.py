@@ -14,6 +14,7 @@ from hippodrome.eval.exchange.drives.calibration import Calibration
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.readers.text import read_lines
 
+MAX_SIDE_PX: Final = 100_000  # of an image
 NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 MATRICES: Final = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "K", "k", "intrinsic_matrix", "M1")
 DISTORTIONS: Final = ("distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs", "D", "d", "dist", "D1")
@@ -55,14 +56,19 @@ def _of_yaml(path: Path, text: str) -> Calibration:
     distortion = _array(path, values, (*DISTORTIONS, "distortion_coeffs"), None)
     model = str(values.get("distortion_model", values.get("model", ""))).lower()
     fisheye = model in ("fisheye", "equidistant", "kannala_brandt")
-    width, height = (values.get(f"image_{side}", values.get(side)) for side in ("width", "height"))
-    size = (width, height) if isinstance(width, int) and isinstance(height, int) and width > 0 and height > 0 else None
+    size = _size(values.get("image_width", values.get("width")), values.get("image_height", values.get("height")))
     if size is None and isinstance(values.get("resolution"), list) and len(values["resolution"]) == 2:
-        size = (int(values["resolution"][0]), int(values["resolution"][1]))
+        size = _size(*values["resolution"])
     found = np.zeros(0) if distortion is None else distortion
     if len(found) not in (0, 4, 5, 8, 12, 14) or (fisheye and len(found) not in (0, 4)):
         raise ExchangeError(f"{path}: {len(found)} distortion coefficients; OpenCV's models have 4, 5, 8, 12 or 14 (fisheye: 4)")
     return _calibration(path, matrix.reshape(3, 3), found, size, fisheye)
+
+
+def _size(width: Any, height: Any) -> tuple[int, int] | None:
+    """Width and height in pixels; None of what is none."""
+    known = [one for one in (width, height) if isinstance(one, int) and 0 < one <= MAX_SIDE_PX]
+    return (known[0], known[1]) if len(known) == 2 else None
 
 
 def _array(path: Path, values: dict[str, Any], names: tuple[str, ...], count: int | None) -> FloatArray | None:
@@ -79,7 +85,7 @@ def _array(path: Path, values: dict[str, Any], names: tuple[str, ...], count: in
 def _floats(path: Path, value: Any) -> FloatArray:
     try:
         return np.asarray(value, dtype=np.float64).ravel()
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         raise ExchangeError(f"{path}: not numbers: {str(value)[:60]}") from None
 
 

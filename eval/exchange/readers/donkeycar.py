@@ -32,15 +32,15 @@ def read_tub(folder: Path, _axes: Axes) -> ForeignDrive:
     rows: list[tuple[float, str, float | None, float | None]] = []
     lost = 0
     for place, record in _records(folder):
-        stamp, name = _first(record, TIMES), record.get(IMAGE)
-        if not isinstance(stamp, int | float) or not isinstance(name, str):
+        stamp, name = _number(_first(record, TIMES)), record.get(IMAGE)
+        if stamp is None or not isinstance(name, str):
             lost += 1
             continue
         if rows and stamp <= rows[-1][0]:
             lost += 1
             continue
         inside(images, name, place)
-        rows.append((float(stamp), name, _number(_first(record, SPEEDS)), _number(_first(record, YAW_RATES))))
+        rows.append((stamp, name, _number(_first(record, SPEEDS)), _number(_first(record, YAW_RATES))))
     if not rows:
         raise ExchangeError(f"{folder}: no record with a time and an image; is it a tub that the car's camera was part of?")
     if lost:
@@ -66,13 +66,16 @@ def _records(folder: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
     index = next((line for line in lines if isinstance(line.get("paths"), list)), None)
     if index is None:
         raise ExchangeError(f"{manifest}: no line names the catalogs (paths)")
-    deleted = set(index["deleted_indexes"]) if isinstance(index.get("deleted_indexes"), list) else set()
+    listed = index.get("deleted_indexes")
+    deleted = {one for one in listed if isinstance(one, int)} if isinstance(listed, list) else set()
     for name in index["paths"]:
         catalog = inside(folder, str(name), manifest)
         for number, line in enumerate(read_lines(catalog), start=1):
             if line.strip():
                 record = _json(catalog, number, line)
-                yield catalog, {} if record.get("_index") in deleted else record
+                number_of_record = record.get("_index")
+                gone = isinstance(number_of_record, int) and number_of_record in deleted
+                yield catalog, {} if gone else record
 
 
 def _json(path: Path, number: int, text: str) -> dict[str, Any]:
@@ -90,4 +93,11 @@ def _first(record: dict[str, Any], names: tuple[str, ...]) -> Any:
 
 
 def _number(value: Any) -> float | None:
-    return float(value) if isinstance(value, int | float) and np.isfinite(value) else None
+    """The value as a float; None of what is none, or is too large to be one."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if np.isfinite(number) else None

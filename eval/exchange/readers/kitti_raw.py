@@ -30,7 +30,7 @@ def read_kitti_raw(folder: Path, _axes: Axes) -> ForeignDrive:
     if camera is None:
         raise ExchangeError(f"{folder}: no image_00/data to image_03/data in it; give a folder DATE_drive_NNNN_sync")
     t_s = _stamps_s(folder / camera / "timestamps.txt")
-    numbered = {int(path.stem): path for path in image_files(folder / camera / "data") if path.stem.isdigit()}
+    numbered = {int(path.stem): path for path in image_files(folder / camera / "data") if path.stem.isdecimal()}
     frames = [file_frame(float(t), numbered[number]) for number, t in enumerate(t_s) if number in numbered]
     if len(frames) < len(t_s):
         print(f"{folder / camera}: {len(t_s) - len(frames)} of {len(t_s)} frames are missing; the drive goes on without them")

@@ -112,4 +112,4 @@ class _Video:
 def _natural(path: Path) -> list[Any]:
     """A key by which numbers in names sort by their value."""
     words = re.split(r"(\d+)", path.name)
-    return [(int(word), "") if word.isdigit() else (-1, word) for word in words]
+    return [(int(word), "") if word.isdecimal() else (-1, word) for word in words]

@@ -1,95 +1,137 @@
-"""ROS 1 and ROS 2 bags, read without ROS: images, an odometry with its twist, poses."""
+"""ROS 1 and ROS 2 bags, read without ROS: images, an odometry with its twist or poses, true poses."""
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Iterator
+import bz2
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, cast
 
-import numpy as np
-from rosbags.highlevel import AnyReader, AnyReaderError
+import lz4.frame
+import rosbags.rosbag1.reader
+import zstandard
+from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from hippodrome.core.types import Trajectory
+from hippodrome.core.types import HippodromeError
 from hippodrome.eval.exchange.drives.errors import ExchangeError
-from hippodrome.eval.exchange.drives.foreign import (
-    ForeignDrive,
-    ForeignFrame,
-    Motion,
-    motion_of,
-    motion_table,
-    trajectory_of,
-)
+from hippodrome.eval.exchange.drives.foreign import ForeignDrive
 from hippodrome.eval.exchange.drives.poses import Axes
-from hippodrome.eval.exchange.readers.messages import TRUTH_TOPICS, png_of, told, without_repeats
+from hippodrome.eval.exchange.readers.mcap_records import (
+    FREE_BYTES,
+    MAGIC,
+    MAX_CHUNK_BYTES,
+    MAX_GROWTH,
+    Reach,
+    one_line,
+    records,
+)
+from hippodrome.eval.exchange.readers.messages import (
+    Kind,
+    OdometryRow,
+    Stamped,
+    choose,
+    frames_of,
+    kept_image,
+    motion_of_odometry,
+    pose_row,
+    truth_of_poses,
+)
 from hippodrome.eval.exchange.readers.spool import Spool
 
-COMPRESSED, RAW = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"
-ODOMETRY, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
+KINDS: Final[dict[str, Kind]] = {
+    "sensor_msgs/msg/CompressedImage": "images",
+    "sensor_msgs/msg/Image": "images",
+    "nav_msgs/msg/Odometry": "odometry",
+    "geometry_msgs/msg/PoseStamped": "poses",
+}
+CURE: Final = (
+    "copy it anew; `rosbag reindex` or `ros2 bag reindex` mend an index; of a ROS 2 bag the .mcap file itself can be imported"
+)
 
 
-def read_rosbag(path: Path, axes: Axes) -> ForeignDrive:
-    """Read a bag: the first topic of images, the first of odometry that is no truth, and the truth by its customary names.
+def read_rosbag(path: Path, axes: Axes, topics: Sequence[str] = ()) -> ForeignDrive:
+    """Read a bag: a topic of images, one of odometry that is no truth, and the truth by its customary names, or ``topics``.
 
-    Raises ExchangeError if the bag cannot be read or has no images.
+    Raises ExchangeError if the bag cannot be read, has no images, or holds more than one drive.
     """
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
-            topics = {one.topic: one.msgtype for one in bag.connections}
-            images = next((topic for topic, kind in topics.items() if kind in (COMPRESSED, RAW)), None)
-            if images is None:
-                listed = ", ".join(f"{topic} ({kind})" for topic, kind in topics.items())[:300] or "none"
-                raise ExchangeError(f"{path}: no topic of {COMPRESSED} or {RAW}; it has: {listed}")
-            truth = next((topic for topic in TRUTH_TOPICS if topics.get(topic) in (POSE, ODOMETRY)), None)
-            odometry = next((topic for topic, kind in topics.items() if kind == ODOMETRY and topic != truth), None)
-            others = [topic for topic, kind in topics.items() if kind in (COMPRESSED, RAW) and topic != images]
-            told(path, images, others, odometry, truth)
+        _require_bounded(path)
+        with _bounded_chunks(), AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+            of_type = {one.topic: one.msgtype for one in bag.connections}
+            chosen = choose(path, {topic: (KINDS.get(name, ""), name) for topic, name in of_type.items()}, topics)
             spool = Spool()
-            frames = [_frame(path, images, stamp, message, spool) for stamp, message in _messages(bag, images)]
-            motion = (
-                _motion(path, odometry, without_repeats(list(_messages(bag, odometry)), f"{path}: {odometry}"))
-                if odometry
-                else None
-            )
-            poses = _poses(path, truth, without_repeats(list(_messages(bag, truth)), f"{path}: {truth}"), axes) if truth else None
-    except (AnyReaderError, OSError, struct.error, ValueError, KeyError, TypeError, IndexError, MemoryError, EOFError) as error:
-        said = " ".join(str(error).split())[:120]
-        raise ExchangeError(f"{path}: not a readable ROS bag ({type(error).__name__}: {said})") from None
-    return ForeignDrive(frames, motion, poses, None)
+            frames = frames_of(_messages(path, bag, chosen.images, spool), f"{path}: {chosen.images}")
+            motion, truth = None, None
+            if chosen.odometry:
+                motion = motion_of_odometry(_messages(path, bag, chosen.odometry, spool), f"{path}: {chosen.odometry}")
+            if chosen.truth:
+                truth = truth_of_poses(_messages(path, bag, chosen.truth, spool), axes, f"{path}: {chosen.truth}")
+        return ForeignDrive(frames, motion, truth, None)
+    except HippodromeError:
+        raise
+    except (Exception, MemoryError) as error:  # of many parsers, each with errors of its own
+        raise ExchangeError(f"{path}: not a readable ROS bag ({type(error).__name__}: {one_line(error)}); {CURE}") from None
 
 
-def _messages(bag: AnyReader, topic: str) -> Iterator[tuple[int, Any]]:
-    """Time in nanoseconds and message of one topic: the header's stamp, which is the sensor's, else the time of recording."""
+def _messages(path: Path, bag: AnyReader, topic: str, spool: Spool) -> list[Stamped]:
+    """The messages of one topic with the header's stamp, which is the sensor's, else the time of recording."""
+    found = []
     for connection, recorded, raw in bag.messages([one for one in bag.connections if one.topic == topic]):
         message: Any = bag.deserialize(raw, connection.msgtype)
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-        yield stamp or recorded, message
+        kind, value = KINDS[connection.msgtype], cast(Any, None)
+        if kind == "images":
+            value = kept_image(message, spool, f"{path}: {topic} at {stamp} ns")
+        elif kind == "poses":
+            value = pose_row(message.pose)
+        else:
+            motion = message.twist.twist
+            value = OdometryRow(pose_row(message.pose.pose), motion.linear.x, motion.angular.z)
+        found.append(Stamped(stamp or recorded, zlib.crc32(raw), value))
+    return found
 
 
-def _frame(path: Path, topic: str, stamp: int, message: Any, spool: Spool) -> ForeignFrame:
-    name = f"{path}: {topic} at {stamp} ns"
-    if hasattr(message, "format"):
-        return ForeignFrame(stamp / 1e9, name, spool.keep(bytes(message.data)))
-    png = png_of(bytes(message.data), message.encoding, message.width, message.height, message.step, name)
-    return ForeignFrame(stamp / 1e9, name, spool.keep(png))
+def _require_bounded(path: Path) -> None:
+    """Raise ExchangeError if a file of a ROS 2 bag is damaged, or unpacks to far more than it is."""
+    for file in sorted(path.iterdir()) if path.is_dir() else ():
+        if file.suffix == ".mcap" and _begins_with(file, MAGIC):
+            for _ in records(file, Reach()):
+                pass
+        elif file.suffix in (".zst", ".zstd"):
+            limit, count = max(FREE_BYTES, MAX_GROWTH * file.stat().st_size), 0
+            with (
+                file.open("rb") as stream,
+                zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES).stream_reader(stream) as plain,
+            ):
+                while piece := plain.read(1 << 20):
+                    count += len(piece)
+                    if count > limit:
+                        raise ExchangeError(f"{file}: unpacked it is more than {limit} bytes; it is no log of a drive")
 
 
-def _motion(path: Path, topic: str, messages: list[tuple[int, Any]]) -> Motion:
-    twists = [message.twist.twist for _, message in messages]
-    t_s = np.array([stamp for stamp, _ in messages]) / 1e9
-    speed, yaw_rate = np.array([one.linear.x for one in twists]), np.array([one.angular.z for one in twists])
-    if len(messages) > 2 and not speed.any() and not yaw_rate.any():
-        poses = _poses(path, topic, messages, "body")
-        if np.ptp(poses.poses[:, :2], axis=0).max() > 0.0:
-            print(f"{path}: {topic}: its velocities are all 0 while its poses move: the poses are differentiated")
-            return motion_of(poses, f"{path}: {topic}")
-    return motion_table(t_s, speed, yaw_rate, f"{path}: {topic}")
+def _begins_with(path: Path, magic: bytes) -> bool:
+    with path.open("rb") as stream:
+        return stream.read(len(magic)) == magic
 
 
-def _poses(path: Path, topic: str, messages: list[tuple[int, Any]], axes: Axes) -> Trajectory:
-    poses = [message.pose.pose if hasattr(message.pose, "pose") else message.pose for _, message in messages]
-    positions = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in poses])
-    quaternions = np.array([(pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w) for pose in poses])
-    t_s = np.array([stamp for stamp, _ in messages]) / 1e9
-    return trajectory_of(t_s, positions, quaternions, axes, f"{path}: {topic}")
+@contextmanager
+def _bounded_chunks() -> Iterator[None]:
+    """While this holds, rosbags unpacks chunks of ROS 1 bags to ``MAX_CHUNK_BYTES`` at most; its own functions know no limit."""
+    known = rosbags.rosbag1.reader.decompressors
+    before = dict(known)
+    known["bz2"] = lambda data: _bounded(bz2.BZ2Decompressor(), data)
+    known["lz4"] = lambda data: _bounded(lz4.frame.LZ4FrameDecompressor(), data)
+    try:
+        yield
+    finally:
+        known.update(before)
+
+
+def _bounded(unpacker: Any, data: bytes) -> bytes:
+    found: bytes = unpacker.decompress(data, max_length=MAX_CHUNK_BYTES + 1)
+    if len(found) > MAX_CHUNK_BYTES:
+        raise ExchangeError(f"a chunk of more than {MAX_CHUNK_BYTES} bytes when unpacked; record it with smaller chunks")
+    return found

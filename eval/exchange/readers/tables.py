@@ -9,18 +9,19 @@ import numpy as np
 import yaml
 
 from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.eval.exchange.drives.camera import OPTICAL_IN_BODY
 from hippodrome.eval.exchange.drives.clock import TimeUnit, in_seconds
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import (
     ForeignDrive,
     ForeignFrame,
     Motion,
+    level_trajectory,
     motion_table,
     trajectory_of,
-    with_increasing_times,
 )
 from hippodrome.eval.exchange.drives.images import file_frame
-from hippodrome.eval.exchange.drives.poses import Axes, planar
+from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.drives.tables import ODOMETRY
 from hippodrome.eval.exchange.readers.motion_csv import read_motion
 from hippodrome.eval.exchange.readers.pictures import image_files
@@ -44,7 +45,7 @@ def read_kitti_sequence(folder: Path, axes: Axes) -> ForeignDrive:
     images = next((folder / name for name in KITTI_CAMERAS if (folder / name).is_dir()), None)
     if images is None:
         raise ExchangeError(f"{folder}: no image_2 or image_0 in it; give a folder sequences/NN of the KITTI odometry layout")
-    numbered = {int(path.stem): path for path in image_files(images) if path.stem.isdigit()}
+    numbered = {int(path.stem): path for path in image_files(images) if path.stem.isdecimal()}
     frames = [file_frame(float(t), numbered[number]) for number, t in enumerate(t_s) if number in numbered]
     if not frames:
         raise ExchangeError(f"{images}: no file NNNNNN.png or NNNNNN.jpg in it")
@@ -68,14 +69,14 @@ def read_euroc_folder(folder: Path, axes: Axes) -> ForeignDrive:
     if (root / EUROC_TRUTH).exists():
         table = read_table(root / EUROC_TRUTH, 8, ",")
         quaternion = np.roll(table[:, 4:8], -1, axis=1)
-        truth = trajectory_of(table[:, 0] / 1e9, table[:, 1:4], quaternion, axes, str(root / EUROC_TRUTH))
+        truth = trajectory_of(table[:, 0] / 1e9, table[:, 1:4], quaternion, axes, str(root / EUROC_TRUTH), True)
     return ForeignDrive(frames, motion, truth, _euroc_focal(root / "cam0" / "sensor.yaml"))
 
 
 def read_tum_poses(path: Path, axes: Axes) -> Trajectory:
     """A TUM trajectory, ``t x y z qx qy qz qw`` a line, with attitudes of any axes."""
     table = read_table(path, 8)
-    return trajectory_of(table[:, 0], table[:, 1:4], table[:, 4:8], axes, str(path))
+    return trajectory_of(table[:, 0], table[:, 1:4], table[:, 4:8], axes, str(path), True)
 
 
 def read_poses(path: Path, axes: Axes, t_s: FloatArray | None, unit: TimeUnit | None) -> Trajectory:
@@ -122,7 +123,7 @@ def _listed(table: Path, separator: str | None, unit_s: float, images: Path) -> 
             # whole nanoseconds divided, as evo and everybody does: a product with 1e-9 would round differently
             t_s = int(words[0]) / 1e9 if unit_s == 1e-9 else float(words[0]) * unit_s
             name = words[1]
-        except (ValueError, IndexError):
+        except (ValueError, IndexError, OverflowError):
             raise ExchangeError(f"{table}: line {number}: not a time and a file name") from None
         if not np.isfinite(t_s):
             raise ExchangeError(f"{table}: line {number}: the time is not finite")
@@ -141,9 +142,18 @@ def kitti_poses(poses: Path, t_s: FloatArray, origin_file: Path | None, axes: Ax
     found = np.tile(np.eye(4), (len(table), 1, 1))
     found[:, :3] = table.reshape(-1, 3, 4)
     if origin_file is not None and origin_file.exists():
-        placed = read_table(origin_file, 4)[:4].reshape(4, 4) @ found
-        return with_increasing_times(Trajectory(t_s, planar(placed[:, :3, 3], placed[:, :3, :3], "camera")), str(poses))
-    return with_increasing_times(Trajectory(t_s, planar(found[:, :3, 3], found[:, :3, :3], axes, world="camera")), str(poses))
+        placed = _origin(origin_file) @ found
+        return level_trajectory(t_s, placed[:, :3, 3], placed[:, :3, :3], "camera", str(poses))
+    positions, rotation = found[:, :3, 3] @ OPTICAL_IN_BODY.T, OPTICAL_IN_BODY @ found[:, :3, :3]
+    return level_trajectory(t_s, positions, rotation, axes, str(poses))
+
+
+def _origin(path: Path) -> FloatArray:
+    """The pose (4, 4) that our exports wrote. Raises ExchangeError."""
+    table = read_table(path, 4)
+    if len(table) != 4:
+        raise ExchangeError(f"{path}: {len(table)} lines of numbers, expected a matrix of 4; export the drive anew")
+    return table
 
 
 def _kitti_focal(path: Path) -> float | None:
@@ -165,5 +175,5 @@ def _euroc_focal(path: Path) -> float | None:
     try:
         values: Any = yaml.safe_load("\n".join(line for line in read_lines(path) if not line.startswith("%YAML")))
         return float(values["intrinsics"][0]) if isinstance(values, dict) and "intrinsics" in values else None
-    except (yaml.YAMLError, ValueError, TypeError, IndexError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError, TypeError, IndexError, KeyError, OverflowError, RecursionError) as error:
         raise ExchangeError(f"{path}: not a sensor description ({' '.join(str(error).split())[:80]})") from None

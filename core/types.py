@@ -275,3 +275,4 @@ class Refinement:
     cognitive_map: CognitiveMap  # frame "network"
     breaks: tuple[MatchBreak, ...]
     estimates: dict[str, float]  # parameters estimated from the data, units in the names: sigma_z_m, beta_m, ...
+    map_error_m: FloatArray | None = None  # (V, 2) drawn place of the road less its true one; None: the roads are taken as exact

@@ -96,7 +96,7 @@ def _explained(route: Route, config: ConfidenceConfig) -> BoolArray:
     return explained
 
 
-def reject_displaced(status: UInt8Array, route: Route, poses: FloatArray, config: ConfidenceConfig) -> UInt8Array:
+def reject_displaced(status: UInt8Array, route: Route, points_m: FloatArray, config: ConfidenceConfig) -> UInt8Array:
     """Status (S,) of the visits, where matched visits that the refinement has moved too far are made ambiguous.
 
     Search and refinement then disagree about the place, and neither is believed.
@@ -104,12 +104,12 @@ def reject_displaced(status: UInt8Array, route: Route, poses: FloatArray, config
     Args:
         status: (S,) MatchStatus of each visit by the search.
         route: the route that the search found.
-        poses: (S, 3) refined poses of the visits.
+        points_m: (S, 2) refined places of the visits on the map as it is drawn.
         config: how far a visit may be moved.
     """
     track = route.track
     found = np.column_stack([np.interp(track.visit_arc, track.arc, route.points_m[:, axis]) for axis in (0, 1)])
-    displaced = np.hypot(*(poses[:, :2] - found).T) > config.most_moved_m
+    displaced = np.hypot(*(points_m - found).T) > config.most_moved_m
     return np.where(displaced & (status == MatchStatus.MATCHED), MatchStatus.AMBIGUOUS, status).astype(np.uint8)
 
 

@@ -64,13 +64,17 @@ def refine_route(
     log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)
     line, arc = _line_and_places(route, network)
     free = on_parallel_lanes(line, network)
-    solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, config.solver)
+    solver = config.solver
+    if solver.survey_sigma_m is None:
+        solver = replace(solver, survey_sigma_m=network.survey_sigma_m)
+    solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver)
     if np.any(free):
-        chosen = choose_lanes(solution.state.poses, vouched > 0.0, network, config.search)
+        drawn = np.column_stack([solution.state.drawn_points_m, solution.state.poses[:, 2]])
+        chosen = choose_lanes(drawn, vouched > 0.0, network, config.search)
         line, arc = _line_and_places(chosen, network)
         log_scale, free = solution.state.log_scale, near_lane_changes(line, network)
-        solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, config.solver)
-    status = reject_displaced(status, route, solution.state.poses, config.confidence)
+        solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver)
+    status = reject_displaced(status, route, solution.state.drawn_points_m, config.confidence)
     return _refinement(cognitive_map, network, line, solution, status)
 
 
@@ -112,7 +116,8 @@ def _refinement(
         covariance=_covariance(solution.covariance[first][:, :3, :3], network, status),
         road_match=_road_match(network, line, solution.arc_m[first], status),
     )
-    return Refinement(refined, match_breaks(status), _estimates(solution))
+    error_m = solution.state.map_error_m
+    return Refinement(refined, match_breaks(status), _estimates(solution), None if error_m is None else error_m[first])
 
 
 def _road_match(network: RoadNetwork, line: RouteLine, arc_m: FloatArray, status: UInt8Array) -> RoadMatch:

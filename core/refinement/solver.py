@@ -39,8 +39,10 @@ class SolverConfig:
     inner_iterations: int = 2
     reprojection_m: float = 4.0  # arc length by which a keyframe's place on the route may move in one round
     unvouched_weight: float = 1e-6  # weight of the road where nothing vouches for it: it determines a pose without pulling it
-    survey_sigma_m: float = 0.0  # sigma per axis of the error of the road network itself; 0: the network is exact
-    survey_length_m: float = 100.0  # correlation length of that error: neighbouring roads are drawn wrong alike
+    survey_sigma_m: float | None = None  # sigma per axis of the error of the road network; None: what the network says of itself
+    survey_length_m: float = (
+        60.0  # correlation length of that error: neighbouring roads are drawn wrong alike
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,10 +79,10 @@ def refine_along_route(
         log_scale: first guess of ln(metres per map unit), (S,).
         vouched: 1 where a keyframe is believed to be on the road of the route, 0 where it may be off the network, (S,).
         free: mask (P,) of the samples of the line whose lane may be the wrong one of several parallel ones.
-        config: number and constants of the rounds.
+        config: number and constants of the rounds; without ``survey_sigma_m`` the line is taken as exact.
     """
     points, heading = points_on_line(line, arc_m)
-    map_error = MapErrorModel(config.survey_sigma_m, config.survey_length_m) if config.survey_sigma_m > 0.0 else None
+    map_error = MapErrorModel(config.survey_sigma_m, config.survey_length_m) if config.survey_sigma_m else None
     no_error_yet = None if map_error is None else np.zeros_like(points)
     state = State(np.column_stack([points, heading]), log_scale, np.zeros(2), no_error_yet)
     noise = Noise()

@@ -34,6 +34,7 @@ class RoadNetwork:
     successor_start: IntArray  # (L + 1,)
     left_lane: IntArray  # (L,) adjacent lane to the left, -1 where there is none
     right_lane: IntArray  # (L,) adjacent lane to the right, -1 where there is none
+    survey_sigma_m: float = 0.0  # standard deviation in each axis of where the roads are drawn; 0: they are where they are drawn
 
     def __repr__(self) -> str:
         roads, km = len(self.edge_ids), float(self.lane_lengths_m().sum()) / 1e3

@@ -79,7 +79,7 @@ def refine_config(scenario: Scenario, mode: RefineMode, survey_error_m: float | 
     if survey_error_m is None:
         survey_error_m = scenario.self_motion_noise.survey_error_m
     solver = config.route.solver
-    stated = replace(solver, survey_sigma_m=solver.survey_sigma_m or survey_error_m)
+    stated = solver if solver.survey_sigma_m is not None else replace(solver, survey_sigma_m=survey_error_m)
     return replace(config, mode=mode, route=replace(config.route, solver=stated))
 
 

@@ -41,6 +41,7 @@ class RouteSearchConfig:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
+    metres_per_unit: float | None = None  # length of a map unit where the odometry is metric; None: unknown, it is searched for
     bin_m: float = 1.0  # length of the bins that lanes are cut into
     step_m: float = 5.0  # length of a step of the drive, if its brisk speed is the network's usual speed limit
     scale_bin: float = 0.04  # width of a scale bin, in ln(metres per map unit)

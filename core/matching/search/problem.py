@@ -13,6 +13,7 @@ from hippodrome.core.matching.search.model import Drive, GraphTables, OffNetwork
 from hippodrome.core.matching.search.track import (
     Track,
     driven_arc,
+    known_scale_range,
     make_track,
     scale_range,
 )
@@ -47,7 +48,8 @@ def search_problem(visits: Visits, network: RoadNetwork, config: RouteSearchConf
     A short drive is cut into four steps at least. The lane graph looks as far ahead as one step at the largest scale, and some
     bins farther for the remainder and the tolerance of a step.
     """
-    low, typical, high = scale_range(visits, network)
+    known = config.metres_per_unit
+    low, typical, high = scale_range(visits, network) if known is None else known_scale_range(known)
     log_scale = np.arange(np.log(low), np.log(high) + config.scale_bin, config.scale_bin)
     track = make_track(visits, min(config.step_m / typical, 0.25 * driven_arc(visits)[-1]))
     graph = build_lane_graph(network, track.step * np.exp(log_scale[-1]) + 4.0 * config.bin_m, config.bin_m)

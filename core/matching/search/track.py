@@ -11,6 +11,7 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, Visits
 
 WANDER = 1.5  # factor by which the scale may leave its usual value for a while, as after a restart of visual odometry
+CALIBRATION = 0.1  # a metric odometry is off by less: tyres and stereo baselines by 1-3 %, and some more in a bend
 WIDE_SCALES = (0.1, 1.0, 10.0)  # metres per map unit tried when the visits carry no usable time
 _BRISK_PERCENTILE = 90.0  # brisk speed of a drive among its speeds while moving: stops and jams do not lower it much
 _BRISK_SHARES = (0.25, 1.3)  # least and largest brisk speed of a drive, as shares of the network's speed limits
@@ -52,6 +53,11 @@ def driven_arc(visits: Visits) -> FloatArray:
     chord = np.hypot(visits.motion[:, 0], visits.motion[:, 1])
     arc: FloatArray = np.cumsum(chord / np.sinc(half_turn / np.pi))  # chord / arc = sin(half_turn) / half_turn
     return arc
+
+
+def known_scale_range(metres_per_unit: float) -> tuple[float, float, float]:
+    """Least, typical and largest metres per map unit of an odometry that is metric but for its calibration."""
+    return metres_per_unit * (1.0 - CALIBRATION), metres_per_unit, metres_per_unit * (1.0 + CALIBRATION)
 
 
 def scale_range(visits: Visits, network: RoadNetwork) -> tuple[float, float, float]:

@@ -82,6 +82,7 @@ class BackgroundTraffic:
     def __init__(
         self, spec: TrafficSpec, network: RoadNetwork, graph: TourGraph, area: IntArray, rng: np.random.Generator
     ) -> None:
+        area = _without_shared_lanes(network, graph, area)
         self._network, self._graph, self._area, self._rng = network, graph, area, rng
         self._wanted = min(spec.vehicles, int(graph.length_m[area].sum() / ROOM_PER_VEHICLE_M))
         self._kind: list[int] = []  # of each vehicle sent so far, its identity being its number
@@ -113,6 +114,12 @@ class BackgroundTraffic:
             poses.append((x - half * math.cos(heading), y - half * math.sin(heading), heading))
             kinds.append(self._kind[number])
         return ids, poses, kinds
+
+
+def _without_shared_lanes(network: RoadNetwork, graph: TourGraph, area: IntArray) -> IntArray:
+    """The edges of an area without those that share their lane with the other direction: whoever met there could not go on."""
+    shared = [bool(libsumo.edge.getBidiEdge(network.edge_ids[edge])) for edge in graph.edges[area]]
+    return area[~np.array(shared, dtype=np.bool_)]
 
 
 def add_vehicle(name: str, vehicle_type: str, network: RoadNetwork, edges: Sequence[int], depart_position: str) -> None:

@@ -19,7 +19,9 @@ from hippodrome._files import replacing
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
 from hippodrome.sim.map_import import sumo_network
-from hippodrome.sim.network import SumoNet, check_network, is_left_hand, load_net, road_network
+from hippodrome.sim.net_file import SumoNet, is_left_hand, load_net
+from hippodrome.sim.net_notes import check_network
+from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
 from hippodrome.sim.spec import Spec
 from hippodrome.sim.sumo_tools import run_tool

@@ -17,6 +17,8 @@ CURES: Final = {  # what to do, by words in the notes of ``sim.network.check_net
     "cannot be left or reached again": "to tour them, import a larger extract, or draw the way back in netedit",
     "zero-length lane": "nothing to do; `netconvert --junctions.join` removes most",
     "coincide at": "if one can drive across, join them: `netconvert --junctions.join`, or netedit",
+    "have one lane for both directions": "nothing to do; for traffic there, give each direction a lane of its own in netedit",
+    "has no lanes inside junctions": "the lanes are then made, also where the file has connections without them",
     "wait for a hand": "nothing to do; a program of your own, drawn in netedit, is kept",
 }
 # Greatest way between two frames: beyond it a view shows another place than the one before, for vertices are 5 m apart.

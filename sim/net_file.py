@@ -1,93 +1,129 @@
-"""Files of SUMO networks: found to be one, of bounded size, and read with ``sumolib``."""
+"""Files of SUMO networks: found to be one, of bounded size, read with ``sumolib``, and refused where they make no sense."""
 
 from __future__ import annotations
 
-import gzip
+import math
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final, TypeAlias
-from xml.parsers import expat
+from typing import IO, Any, Final, TypeAlias
 from xml.sax import SAXException, parse
 
 import sumolib
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.sim.xml_head import one_line, opened, root_of
 
 SumoNet: TypeAlias = Any  # sumolib.net.Net: sumolib has no types
 SumoLane: TypeAlias = Any
 
 SUMO_TRUE: Final = {"true", "1", "yes", "on", "x", "t"}  # what SUMO reads as true, in any case of letters
-PIECE_BYTES: Final = 1 << 14
-MAX_HEAD_BYTES: Final = 64 << 20  # of comments before the root element
+MAX_NET_BYTES: Final = 1 << 30  # unpacked; a network of 1,000 km has some 200 MB
+FARTHEST_M: Final = 1e8  # from the origin: more than any place on Earth is in any projection
+FASTEST_MPS: Final = 1000.0  # a speed limit beyond it is a slip of the pen
+WIDEST_M: Final = 1000.0
+OLDEST_VERSION: Final = "0.13"  # of networks that do not say theirs
 
 
 def load_net(net_file: Path) -> SumoNet:
     """``sumolib``'s network, internal lanes included; every way of being unreadable is one ``HippodromeError``."""
     _reject_foreign(net_file)
     try:
-        with gzip.open(net_file) if _is_packed(net_file) else net_file.open("rb") as stream:
+        with opened(net_file) as stream:
             reader = _NetReader(withInternal=True, withFoes=False, withPrograms=True, withMacroConnectors=True)
-            parse(stream, reader)
+            parse(_Bounded(stream, net_file), reader)
         net = reader.getNet()
         net.initRoutingCache(1000)  # as sumolib.net.readNet does
-        return net
     except (SAXException, OSError, EOFError, zlib.error) as error:
-        raise HippodromeError(f"{net_file}: broken network ({_one_line(error)}); write it again with netconvert") from error
-    except (KeyError, AttributeError, ValueError, TypeError, IndexError) as error:
-        reason = f"{type(error).__name__} {_one_line(error)}"
+        raise HippodromeError(f"{net_file}: broken network ({one_line(error)}); write it again with netconvert") from error
+    except (KeyError, AttributeError, ValueError, TypeError, IndexError, OverflowError) as error:
+        reason = f"{type(error).__name__} {one_line(error)}"
         raise HippodromeError(f"{net_file}: not a consistent SUMO network ({reason}); write it again with netconvert") from error
-
-
-class _NetReader(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has no types
-    """sumolib's reader, which takes the offset of a traffic light for a number; SUMO also knows ``begin``. We use none."""
-
-    def startElement(self, name: str, attrs: Any) -> None:
-        if name == "tlLogic" and attrs.get("offset") == "begin":
-            attrs = {**dict(attrs.items()), "offset": "0"}
-        super().startElement(name, attrs)
+    for fault in _faults(net):
+        raise HippodromeError(f"{net_file}: not a consistent SUMO network ({fault}); mend it in netedit, or write it again")
+    return net
 
 
 def is_left_hand(net_file: Path) -> bool:
     """Driving side, from the ``<net lefthand=...>`` attribute, which sumolib does not keep; read as SUMO reads booleans."""
-    _, attributes = _root(net_file)
+    _, attributes = root_of(net_file)
     return attributes.get("lefthand", "").lower() in SUMO_TRUE
+
+
+class _NetReader(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has no types
+    """sumolib's reader, made as patient as SUMO's: ``offset="begin"`` of traffic lights, whose offsets we do not use, and a
+    root without a version."""
+
+    def startElement(self, name: str, attrs: Any) -> None:
+        if name == "tlLogic" and attrs.get("offset") == "begin":
+            attrs = {**dict(attrs.items()), "offset": "0"}
+        if name == "net" and attrs.get("version") is None:
+            attrs = {**dict(attrs.items()), "version": OLDEST_VERSION}
+        super().startElement(name, attrs)
+
+
+class _Bounded:
+    """A stream that ends in an error before it fills the memory."""
+
+    def __init__(self, stream: IO[Any], net_file: Path) -> None:
+        self._stream, self._net_file, self._count = stream, net_file, 0
+
+    def read(self, size: int = -1) -> Any:
+        """The next bytes, at most ``size``. Raises HippodromeError where they are too many in all."""
+        piece = self._stream.read(size)
+        self._count += len(piece)
+        if self._count > MAX_NET_BYTES:
+            raise HippodromeError(
+                f"{self._net_file}: more than {MAX_NET_BYTES >> 20} MiB unpacked; cut out a smaller area "
+                f"(netconvert --keep-edges.in-boundary)"
+            )
+        return piece
+
+    def close(self) -> None:
+        """Closes the stream."""
+        self._stream.close()
+
+
+def _faults(net: SumoNet) -> Iterator[str]:
+    """What nobody can drive on, as phrases: places that are not described, and numbers that cannot be."""
+    for node in net.getNodes():
+        place = node.getCoord3D()
+        if place is None:
+            yield f"edges meet at junction {node.getID()!r}, which the file does not describe"
+        elif not all(abs(value) < FARTHEST_M for value in place[:2]):
+            yield f"junction {node.getID()!r} lies at {_numbers(place[:2])} m"
+        elif not all(abs(value) < FARTHEST_M for point in node.getShape() or () for value in point):
+            yield f"the outline of junction {node.getID()!r} goes farther than {FARTHEST_M:.0e} m"
+    for edge in net.getEdges():
+        if edge.getFunction() in ("", "connector") and (edge.getFromNode() is None or edge.getToNode() is None):
+            yield f"edge {edge.getID()!r} does not say between which junctions it lies"
+        for lane in edge.getLanes():
+            yield from _lane_faults(lane)
+
+
+def _lane_faults(lane: SumoLane) -> Iterator[str]:
+    name, shape = lane.getID(), lane.getShape()
+    if lane.allows("passenger") and not 0.0 < lane.getSpeed() <= FASTEST_MPS:
+        yield f"lane {name!r} has a speed limit of {lane.getSpeed():g} m/s"
+    if not 0.0 < lane.getWidth() <= WIDEST_M:
+        yield f"lane {name!r} has a width of {lane.getWidth():g} m"
+    if not 0.0 <= lane.getLength() < FARTHEST_M:
+        yield f"lane {name!r} has a length of {lane.getLength():g} m"
+    if any(not math.isfinite(value) or abs(value) >= FARTHEST_M for point in shape for value in point):
+        yield f"lane {name!r} has a shape that goes farther than {FARTHEST_M:.0e} m or nowhere"
+
+
+def _numbers(values: Any) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"
 
 
 def _reject_foreign(net_file: Path) -> None:
     if not net_file.is_file():
         raise HippodromeError(f"{net_file}: no such network file; give a SUMO .net.xml or .net.xml.gz")
-    tag, _ = _root(net_file)
+    tag, _ = root_of(net_file)
     if tag == "net":
         return
     if tag in ("osm", "OpenDRIVE"):
         kind = ".osm" if tag == "osm" else ".xodr"
         raise HippodromeError(f"{net_file}: not a SUMO network but a map to convert; name it {kind} and netconvert is run")
     raise HippodromeError(f"{net_file}: not a SUMO network (no <net> element); give a .net.xml or .net.xml.gz")
-
-
-def _root(net_file: Path) -> tuple[str, dict[str, str]]:
-    """Name and attributes of the root element, however long the comments before it; an empty name where there is none."""
-    found: list[tuple[str, dict[str, str]]] = []
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = lambda name, attributes: found.append((name, attributes))
-    try:
-        with gzip.open(net_file) if _is_packed(net_file) else net_file.open("rb") as stream:
-            for _ in range(MAX_HEAD_BYTES // PIECE_BYTES):
-                piece = stream.read(PIECE_BYTES)
-                parser.Parse(piece, not piece)
-                if found or not piece:
-                    break
-    except expat.ExpatError:
-        pass  # the root may stand before what is broken, and else there is none
-    except (OSError, EOFError, zlib.error) as error:
-        raise HippodromeError(f"{net_file}: unreadable ({_one_line(error)}); check the file") from error
-    return found[0] if found else ("", {})
-
-
-def _is_packed(net_file: Path) -> bool:
-    with net_file.open("rb") as stream:
-        return stream.read(2) == b"\x1f\x8b"
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())

@@ -15,6 +15,7 @@ import numpy as np
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 from hippodrome.sim.network import HELD_PHASE_S
+from hippodrome.sim.sumo_tools import without_comma
 from hippodrome.sim.tour import TourGraph
 from hippodrome.sim.traffic import KIND_SHARES, VEHICLE_SIZES_M, TrafficSpec, random_trip
 
@@ -29,11 +30,11 @@ SIGHT_M: Final = 150.0  # vehicles farther from the ego are not logged
 @contextmanager
 def sumo_run(net_file: Path, vehicle_types: str, seed: int) -> Iterator[None]:
     """Starts SUMO on a network in this process and closes it whatever happens."""
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, without_comma(net_file) as named:
         types_file = Path(folder) / "types.add.xml"
         types_file.write_text(vehicle_types, encoding="utf-8")
         options = (
-            f"--net-file={_without_comma(net_file, Path(folder))}",
+            f"--net-file={named}",
             f"--additional-files={types_file}",
             f"--seed={seed % 2**31}",
             f"--step-length={SUMO_STEP_S}",
@@ -55,15 +56,6 @@ def sumo_run(net_file: Path, vehicle_types: str, seed: int) -> Iterator[None]:
             raise HippodromeError(f"{net_file}: SUMO failed: {' '.join(str(error).split())}") from error
         finally:
             libsumo.close()
-
-
-def _without_comma(net_file: Path, folder: Path) -> Path:
-    """The network by a name that SUMO does not take for several files: a link in ``folder`` if there is a comma in its path."""
-    if "," not in str(net_file):
-        return net_file
-    link = folder / f"town{'.net.xml.gz' if net_file.suffix == '.gz' else '.net.xml'}"
-    link.symlink_to(net_file.resolve())
-    return link
 
 
 def _let_signals_run() -> None:

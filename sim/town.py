@@ -24,7 +24,7 @@ from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
 from hippodrome.sim.spec import Spec
-from hippodrome.sim.sumo_tools import run_tool
+from hippodrome.sim.sumo_tools import check_that_sumo_reads, run_tool
 from hippodrome.sim.types import Town
 
 LANE_WIDTH_M: Final = 3.2  # SUMO's default
@@ -60,6 +60,7 @@ def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
     if spec.network is not None:
         net_file, notes = sumo_network(spec.network, work_dir)
         town = read_town(net_file)
+        check_that_sumo_reads(net_file)
         return replace(town, notes=(*notes, *town.notes))
     recipe = f"{spec.model_dump_json()} {rng_seed} {CONVERT_OPTIONS} {CROSSING_RADIUS_M} {THROUGH_RADIUS_M}"
     net_file = work_dir / f"{spec.kind}-{hashlib.sha256(recipe.encode()).hexdigest()[:12]}.net.xml"

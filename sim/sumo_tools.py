@@ -17,8 +17,9 @@ import sumo
 from hippodrome.core.types import HippodromeError
 
 TOOL_TIMEOUT_S: Final = 120.0  # netconvert takes 0.1 s for a generated town and some 10 s for a city
-TOOL_BYTES: Final = 2 << 30  # memory of a program; netconvert takes 0.1 GiB for a generated town
-BYTES_PER_INPUT_BYTE: Final = 32  # memory beyond it for large maps: netconvert takes some ten times the size of a city's map
+TOOL_BYTES: Final = 1 << 30  # memory of a program; netconvert takes 0.1 GiB for a generated town
+BYTES_PER_INPUT_BYTE: Final = 64  # memory beyond it for large maps: netconvert takes some ten times the size of a city's map
+PACKED: Final = 20  # a packed network is some ten times smaller than the same unpacked
 MAX_COMPLAINT: Final = 500  # characters
 
 
@@ -106,8 +107,10 @@ def check_that_sumo_reads(net_file: Path) -> None:
 def _try_once(net_file: Path, changed_ns: int, size: int) -> None:  # the same file as it was is not tried again
     try:
         with without_comma(net_file) as named:
-            run_tool("sumo", f"--net-file={named}", "--end=0.1", "--step-length=0.1", "--xml-validation=never", "--no-warnings",
-                     "--no-step-log", "--duration-log.disable", input_bytes=size)  # fmt: skip
+            run_tool(
+                "sumo", f"--net-file={named}", "--end=0.1", "--step-length=0.1", "--xml-validation=never", "--no-warnings",
+                "--no-step-log", "--duration-log.disable", input_bytes=PACKED * size if net_file.suffix == ".gz" else size,
+            )  # fmt: skip
     except HippodromeError as error:
         cure = f"mend it in netedit, or write it again: netconvert -s {net_file.name} -o NEW.net.xml"
         raise HippodromeError(f"{net_file}: SUMO cannot drive on it: {error}; {cure}") from error

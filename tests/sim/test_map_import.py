@@ -12,6 +12,7 @@ from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.sim import map_import
 from hippodrome.sim.map_import import import_map, sumo_network
 from hippodrome.sim.network import read_network
+from hippodrome.sim.opendrive import with_arcs_for_arcs
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.town import TownSpec, build_town, read_town
 
@@ -188,4 +189,4 @@ def test_a_spiral_that_is_an_arc_is_read_as_one(tmp_path, end):
 def test_a_spiral_that_is_one_goes_to_netconvert_as_it_is(tmp_path):
     source = tmp_path / "map.xodr"
     source.write_text(OVAL.format(end="0.06"))
-    assert map_import._with_arcs_for_arcs(source) == 0 and source.read_text() == OVAL.format(end="0.06")
+    assert with_arcs_for_arcs(source) == 0 and source.read_text() == OVAL.format(end="0.06")

@@ -89,7 +89,7 @@ def test_a_program_that_wants_too_much_memory_or_time_ends(tmp_path, monkeypatch
     monkeypatch.setattr(sumo_tools, "TOOL_BYTES", 64 << 20)
     with pytest.raises(HippodromeError, match=r"netgenerate (failed|crashed)"):
         run_tool("netgenerate", "--grid", "--grid.number=60", f"--output-file={tmp_path}/a.net.xml")
-    monkeypatch.setattr(sumo_tools, "TOOL_BYTES", 2 << 30)
+    monkeypatch.setattr(sumo_tools, "TOOL_BYTES", 1 << 30)
     monkeypatch.setattr(sumo_tools, "TOOL_TIMEOUT_S", 0.2)
     with pytest.raises(HippodromeError, match="netgenerate: no answer within 0 s"):
         run_tool("netgenerate", "--grid", "--grid.number=200", f"--output-file={tmp_path}/a.net.xml")

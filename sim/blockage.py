@@ -34,12 +34,19 @@ def send_ego_again() -> None:
     libsumo.vehicle.add(EGO, f"route-{EGO}", typeID="ego", departLane="best", departPos="base")
 
 
+def red_signal() -> str:
+    """The traffic light that the ego waits at, as first of its lane; empty if none is red there."""
+    for signal, _, distance_m, state in libsumo.vehicle.getNextTLS(EGO)[:1]:
+        if distance_m < SIGNAL_AHEAD_M and state in "rRyY":
+            return str(signal)
+    return ""
+
+
 def what_holds_ego() -> str:
     """Why the ego stands though no vehicle is near it, with the cure."""
     edge, lane = libsumo.vehicle.getRoadID(EGO), libsumo.vehicle.getLaneID(EGO)
-    for signal, _, distance_m, state in libsumo.vehicle.getNextTLS(EGO)[:1]:
-        if distance_m < SIGNAL_AHEAD_M and state in "rRyY":
-            return f"the traffic light {signal} at the end of edge {edge} shows it no green; give it a program with green for all"
+    if signal := red_signal():
+        return f"the traffic light {signal} at the end of edge {edge} shows it no green; give it a program with green for all"
     route, index = libsumo.vehicle.getRoute(EGO), libsumo.vehicle.getRouteIndex(EGO)
     onward = route[index + 1] if index + 1 < len(route) else ""
     leads_to = {link[0].rpartition("_")[0] for link in libsumo.lane.getLinks(lane)}

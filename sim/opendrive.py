@@ -10,8 +10,8 @@ from typing import Final
 from hippodrome.core.types import HippodromeError
 
 STRAIGHT_ENOUGH_M: Final = 1e-3  # a spiral that bends away from an arc by less is taken for one, which netconvert can compute
-SPIRAL: Final = re.compile(r'(<geometry\b[^>]*\blength="([^"]+)"[^>]*>\s*)<spiral\b([^>]*?)(?:/>|>\s*</spiral>)')
-CURVATURE: Final = re.compile(r'\b(curvStart|curvEnd)="([^"]+)"')
+SPIRAL: Final = re.compile(r"""(<geometry\b[^>]*\blength\s*=\s*["']([^"']+)["'][^>]*>\s*)<spiral\b([^>]*?)(?:/>|>\s*</spiral>)""")
+CURVATURE: Final = re.compile(r"""\b(curvStart|curvEnd)\s*=\s*["']([^"']+)["']""")
 
 
 def with_arcs_for_arcs(plain: Path) -> int:

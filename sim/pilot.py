@@ -9,8 +9,8 @@ import libsumo
 import numpy as np
 
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import HippodromeError, IntArray
-from hippodrome.sim.blockage import clear_around, ego_is_waiting, send_ego_again, what_holds_ego
+from hippodrome.core.types import FloatArray, HippodromeError, IntArray
+from hippodrome.sim.blockage import clear_around, ego_is_waiting, red_signal, send_ego_again, what_holds_ego
 from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M, EgoSpec, comfortable_speed_mps
 from hippodrome.sim.lane_log import LaneLog, driven_edges, lane_pieces, lanes_ahead, ways_out, ways_to_edge
 from hippodrome.sim.path import STEP_M, Piece, piece_of_samples, piece_starts, smooth_path
@@ -21,13 +21,14 @@ from hippodrome.sim.types import TrafficLog
 WARM_UP_S: Final = 20.0  # traffic spreads before the ego enters
 ENTRY_PATIENCE_S: Final = 120.0  # for a gap to enter the road
 CLEARED_AFTER_S: Final = 20.0  # so long traffic is waited for at the entrance; then it is taken away there
-STUCK_AFTER_S: Final = 180.0  # longer than any red light; then traffic is taken away round the ego
+STUCK_AFTER_S: Final = 180.0  # longer than a red light; at a light twice as long is waited
 MOST_CLEARINGS: Final = 20  # in one drive: each costs three minutes, and a network that needs more of them is not drivable
 SIGHT_AHEAD_M: Final = 80.0  # braking from 50 km/h at 2 m/s^2 takes 50 m
 SIGHT_BEHIND_M: Final = 15.0  # the bend that the rear axle is still in
 REFILL_STEPS: Final = 10  # traffic is topped up once a second
 LAST_CHANCE_M: Final = 8.0  # a turn is given up this long before the car would have to stop for it
 LAST_EDGE_M: Final = 60.0  # a tour that is not done is planned on this long before its end
+COUNTED_OTHERWISE: Final = 0.1  # beyond it a network's own lengths of its lanes are meant to differ from the drawing
 SPARE_M: Final = 200.0  # planned beyond the tour's length, so that SUMO's ego does not leave the road before
 
 
@@ -66,6 +67,7 @@ class Pilot:
         self._network, self._graph, self._area, self._tour, self._ego, self._rng = network, graph, area, tour, ego, rng
         self._lane_number = {name: i for i, name in enumerate(network.lane_ids)}
         self._lengths_m, self._length_factors = network.lane_lengths_m(), drawn_length_factors(network)
+        self._drawn_share = _drawn_share(network, self._length_factors)
         self._route: list[int] = []  # edges of the network
         self._leads_on = True  # the present lane leads to the route's next edge
         self._cap_mps, self._cap_offset_m = np.zeros(1), 0.0
@@ -87,8 +89,9 @@ class Pilot:
                 self._replan()
             self._set_speed()
             standing_steps = standing_steps + 1 if self._log.speed_mps[-1] < 0.1 else 0
-            if standing_steps * SUMO_STEP_S > STUCK_AFTER_S:
-                self._free()
+            standing_s = standing_steps * SUMO_STEP_S
+            if standing_s > 2.0 * STUCK_AFTER_S or (standing_s > STUCK_AFTER_S and not red_signal()):
+                self._free(standing_s)
                 standing_steps = 0
             if len(self._log.lane) % REFILL_STEPS == 0:
                 others.refill(ego_on_road=True)
@@ -98,12 +101,11 @@ class Pilot:
             f"edge {last}: SUMO took the ego off the road before its tour was done; set another seed, or check it in netedit"
         )
 
-    def _free(self) -> None:
+    def _free(self, standing_s: float) -> None:
         """Traffic in a knot with the ego is taken off the road. Raises HippodromeError where it is not traffic that holds it."""
         edge = libsumo.vehicle.getRoadID(EGO)
-        cleared = clear_around(*libsumo.vehicle.getPosition(EGO))
-        if cleared == 0:
-            raise HippodromeError(f"edge {edge}: the ego has been standing for {STUCK_AFTER_S:.0f} s: {what_holds_ego()}")
+        if red_signal() or clear_around(*libsumo.vehicle.getPosition(EGO)) == 0:
+            raise HippodromeError(f"edge {edge}: the ego has been standing for {standing_s:.0f} s: {what_holds_ego()}")
         self._clearings += 1
         if self._clearings > MOST_CLEARINGS:
             raise HippodromeError(
@@ -148,7 +150,7 @@ class Pilot:
         if self._tour.duration_s is not None and len(self._log.lane) * SUMO_STEP_S > self._tour.duration_s:
             return True
         by_time_only = self._tour.length_m is None and self._tour.duration_s is not None
-        return not by_time_only and libsumo.vehicle.getDistance(EGO) >= self._tour.planned_length_m()
+        return not by_time_only and libsumo.vehicle.getDistance(EGO) * self._drawn_share >= self._tour.planned_length_m()
 
     def _write_down(self, others: BackgroundTraffic) -> None:
         name = libsumo.vehicle.getLaneID(EGO)
@@ -234,3 +236,10 @@ class Pilot:
 
     def _network_edges(self, tour: IntArray) -> list[int]:
         return [int(edge) for edge in self._graph.edges[tour]]
+
+
+def _drawn_share(network: RoadNetwork, factors: FloatArray) -> float:
+    """Metres drawn per metre that SUMO counts, over all roads; 1 where the two agree about as well as they do in any network."""
+    drawn_m = np.where(network.is_internal, 0.0, network.lane_lengths_m())
+    share = float(drawn_m.sum() / (drawn_m / factors).sum())
+    return share if abs(share - 1.0) > COUNTED_OTHERWISE else 1.0

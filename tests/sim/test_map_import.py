@@ -175,11 +175,12 @@ OVAL = """<OpenDRIVE><header revMajor="1" revMinor="4"/><road name="oval" length
 </laneSection></lanes></road></OpenDRIVE>"""
 
 
+@pytest.mark.parametrize("quote", ['"', "'"])
 @pytest.mark.parametrize("end", ["0.05", "0.05000000000000001"])
-def test_a_spiral_that_is_an_arc_is_read_as_one(tmp_path, end):
+def test_a_spiral_that_is_an_arc_is_read_as_one(tmp_path, end, quote):
     """netconvert makes a straight of the one and runs out of memory on the other; the half circles have a radius of 20 m."""
     source = tmp_path / "oval.xodr"
-    source.write_text(OVAL.format(end=end))
+    source.write_text(OVAL.format(end=end).replace('"', quote))
     net_file, notes = sumo_network(source, tmp_path)
     points = read_network(net_file).points_m
     assert "2 spiral(s) of constant curvature" in notes[0]

@@ -43,6 +43,30 @@ def square(side_m=150.0, **more):
     return "".join(node(name, x, y, **more) for name, (x, y) in corners(side_m).items())
 
 
+def motorway(folder):
+    """Two carriageways of three lanes with 36 m/s, turned at the ends, with an exit and an entrance over a link road."""
+    nodes = square(600) + node("E", 200, 0) + node("F", 400, 0) + node("G", 300, -80)
+    ways = "".join(edge(ends, numLanes=3, speed=36) for ends in ("AE", "EF", "FB", "BC", "CD", "DA"))
+    return converted(folder, nodes, ways + edge("EG", speed=14) + edge("GF", speed=14), "--ramps.guess")
+
+
+def one_way_grid(folder):
+    """Nine crossings of streets that have one direction each, in turn."""
+    names = ("ABC", "DEF", "GHI")
+    nodes = "".join(node(name, 90 * x, 90 * y) for y, row in enumerate(names) for x, name in enumerate(row))
+    lines = ("ABC", "FED", "GHI", "GDA", "BEH", "IFC")
+    return converted(folder, nodes, "".join(edge(line[i : i + 2]) for line in lines for i in (0, 1)))
+
+
+def shared_space(folder):
+    """A place of 25 m where six streets meet, all at walking pace."""
+    arms = "BCDEFG"
+    angle = [2 * math.pi * i / 6 for i in range(6)]
+    ends = [node(n, 90 * math.cos(a), 90 * math.sin(a)) for n, a in zip(arms, angle, strict=True)]
+    ring = [a + b for a, b in zip(arms, arms[1:] + "B", strict=True)]
+    return converted(folder, node("A", 0, 0, radius=25) + "".join(ends), both(*(f"A{n}" for n in arms), *ring, speed=2))
+
+
 def narrow_lanes(folder):
     """Lanes of half a metre."""
     return converted(folder, square(), both("AB", "BC", "CD", "DA", width=0.5))

@@ -34,6 +34,7 @@ def load_net(net_file: Path) -> SumoNet:
             parse(_Bounded(stream, net_file), reader)
         net = reader.getNet()
         net.initRoutingCache(1000)  # as sumolib.net.readNet does
+        net.lost_places_to_wait = sorted(reader.lanes_after_waiting - reader.places_to_wait)
     except (SAXException, OSError, EOFError, zlib.error) as error:
         raise HippodromeError(f"{net_file}: broken network ({one_line(error)}); write it again with netconvert") from error
     except (KeyError, AttributeError, ValueError, TypeError, IndexError, OverflowError) as error:
@@ -44,6 +45,16 @@ def load_net(net_file: Path) -> SumoNet:
     return net
 
 
+def check_places_to_wait(net: SumoNet, net_file: Path) -> None:
+    """Raises HippodromeError where a junction inside of a junction lacks: SUMO reads such a network, and crashes when a car
+    comes there. To lay a drive on the roads it does no harm."""
+    for name in net.lost_places_to_wait:
+        raise HippodromeError(
+            f"{net_file}: junction {name!r}, where cars wait inside a crossing, is not described; write the network again: "
+            f"netconvert -s {net_file.name} -o NEW.net.xml"
+        )
+
+
 def is_left_hand(net_file: Path) -> bool:
     """Driving side, from the ``<net lefthand=...>`` attribute, which sumolib does not keep; read as SUMO reads booleans."""
     _, attributes = root_of(net_file)
@@ -52,10 +63,19 @@ def is_left_hand(net_file: Path) -> bool:
 
 class _NetReader(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has no types
     """sumolib's reader, made as patient as SUMO's: ``offset="begin"`` of traffic lights, whose offsets we do not use, and a
-    root without a version."""
+    root without a version. It also keeps where cars wait inside junctions, which sumolib leaves out."""
+
+    def __init__(self, **options: bool) -> None:
+        super().__init__(**options)
+        self.places_to_wait: set[str] = set()  # junctions inside of junctions
+        self.lanes_after_waiting: set[str] = set()  # each begins at such a junction of its own name
 
     def startElement(self, name: str, attrs: Any) -> None:
-        if name == "tlLogic" and attrs.get("offset") == "begin":
+        if name == "junction" and attrs.get("type") == "internal":
+            self.places_to_wait.add(attrs["id"])
+        elif name == "connection" and attrs["from"].startswith(":") and attrs.get("via"):
+            self.lanes_after_waiting.add(attrs["via"])
+        if name == "tlLogic" and attrs.get("offset", "begin") == "begin":
             attrs = {**dict(attrs.items()), "offset": "0"}
         if name == "net" and attrs.get("version") is None:
             attrs = {**dict(attrs.items()), "version": OLDEST_VERSION}

@@ -20,7 +20,7 @@ from hippodrome.core.types import FloatArray, HippodromeError
 from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
 from hippodrome.sim.map_import import LEFT_HAND, sumo_network
-from hippodrome.sim.net_file import SumoNet, is_left_hand, load_net
+from hippodrome.sim.net_file import SumoNet, check_places_to_wait, is_left_hand, load_net
 from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
@@ -86,6 +86,7 @@ def _check_side(choice: Choice, left_hand: bool, network: Path) -> None:
 def read_town(net_file: Path, name: str | None = None) -> Town:
     """A town from a SUMO network file, checked."""
     net = load_net(net_file)
+    check_places_to_wait(net, net_file)
     network = road_network(net, net_file)
     left_hand = is_left_hand(net_file)
     return Town(

@@ -165,7 +165,7 @@ def _town(source: str, imported: Path | None, folder: Path, driving_side: Choice
     network = imported or located(Path(source), "--from")
     if not network.is_file():
         raise HippodromeError(f"--from {source}: neither a kind of town ({', '.join(KINDS)}) nor a file")
-    if not network.name.endswith(KNOWN):
+    if not network.name.lower().endswith(KNOWN):
         raise HippodromeError(f"--from {source}: unknown kind of map; there are {', '.join(KNOWN)}")
     try:
         return build_town(TownSpec(network=network.resolve(), driving_side=driving_side), 1, folder)

@@ -9,6 +9,7 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.sim import net_file as net_files
 from hippodrome.sim import sumo_tools
 from hippodrome.sim.net_file import load_net
+from hippodrome.sim.network import read_network
 from hippodrome.sim.sumo_tools import check_that_sumo_reads, run_tool
 from hippodrome.sim.town import TownSpec, build_town
 
@@ -55,6 +56,15 @@ def test_a_network_that_crashes_sumo_is_refused(tmp_path, crossing):
     file = written(tmp_path, changed)
     with pytest.raises(HippodromeError, match=r"SUMO cannot drive on it: sumo (crashed|failed).*netconvert -s broken\.net"):
         build_town(TownSpec(network=file), 1, tmp_path)
+
+
+def test_a_network_that_crashes_sumo_when_a_car_comes_is_refused(tmp_path, crossing):
+    changed, count = re.subn(r'<junction id=":B1_\d+_0" type="internal".*?/>', "", crossing, count=1)
+    assert count == 1
+    file = written(tmp_path, changed)
+    with pytest.raises(HippodromeError, match=r"junction ':B1_\d+_0', where cars wait inside a crossing, is not described"):
+        build_town(TownSpec(network=file), 1, tmp_path)
+    assert read_network(file).lane_count > 0
 
 
 def test_what_sumo_complains_of_is_told(tmp_path, crossing):

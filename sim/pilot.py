@@ -29,6 +29,7 @@ REFILL_STEPS: Final = 10  # traffic is topped up once a second
 LAST_CHANCE_M: Final = 8.0  # a turn is given up this long before the car would have to stop for it
 LAST_EDGE_M: Final = 60.0  # a tour that is not done is planned on this long before its end
 COUNTED_OTHERWISE: Final = 0.1  # beyond it a network's own lengths of its lanes are meant to differ from the drawing
+SLOWEST_SCALE: Final = 0.1  # metres drawn per metre counted; lanes below it are points
 SPARE_M: Final = 200.0  # planned beyond the tour's length, so that SUMO's ego does not leave the road before
 
 
@@ -195,7 +196,8 @@ class Pilot:
         """No faster than what the rear axle's place on the path allows; SUMO adds right of way and the cars ahead."""
         where = (self._log.position_m[-1] + self._cap_offset_m) / STEP_M
         k = min(max(int(where), 0), len(self._cap_mps) - 1)
-        libsumo.vehicle.setSpeed(EGO, float(self._cap_mps[k]))
+        scale = 1.0 if self._drawn_share == 1.0 else max(float(self._length_factors[self._log.lane[-1]]), SLOWEST_SCALE)
+        libsumo.vehicle.setSpeed(EGO, float(self._cap_mps[k]) / scale)
 
     def _turn_is_missed(self) -> bool:
         """On a lane that does not lead where the route goes, too near its end to change."""

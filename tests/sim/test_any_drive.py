@@ -100,4 +100,4 @@ def test_a_tour_goes_on_where_lanes_are_counted_shorter_than_drawn(tmp_path):
     ways = "".join(f'<edge id="{a}{b}" from="{a}" to="{b}" speed="9" length="50"/>' for a, b in ("AB", "BC", "CD", "DA"))
     square = town(tmp_path, SQUARE, ways)
     drive = simulate_drive(square, TourSpec(length_m=1500), TrafficSpec(vehicles=2), EgoSpec(), 1)
-    assert length_m(drive) > 1480
+    assert length_m(drive) == pytest.approx(1500, rel=0.05)  # lanes inside junctions are counted as drawn

@@ -94,7 +94,30 @@ def _groups(log: LaneLog) -> list[tuple[int, int]]:
 
 
 def _way(network: RoadNetwork, lengths_m: FloatArray, source: int, target: int) -> list[tuple[bool, int]]:
-    """Shortest chain of moves (to the side or on, lane) from one lane to another, at least one move long (Dijkstra)."""
+    """Shortest chain of moves (to the side or on, lane) from one lane to another, at least one move long.
+
+    SUMO changes lanes inside junctions too, where ``network`` has no neighbours; that is tried where there is no other way.
+
+    Raises:
+        HippodromeError: Neither leads there.
+    """
+    if target in _beside_in_junction(network, source):
+        return [(True, target)]
+    way = _shortest_way(network, lengths_m, source, target, in_junctions=False)
+    if way is None:
+        way = _shortest_way(network, lengths_m, source, target, in_junctions=True)
+    if way is None:
+        names = network.lane_ids[source], network.lane_ids[target]
+        raise HippodromeError(
+            f"ego: SUMO moved it from lane {names[0]} to {names[1]}, which are not connected; check the network there"
+        )
+    return way
+
+
+def _shortest_way(
+    network: RoadNetwork, lengths_m: FloatArray, source: int, target: int, in_junctions: bool
+) -> list[tuple[bool, int]] | None:
+    """Dijkstra's search for the moves of ``_way``, with or without changes of lane inside junctions; None: there is no way."""
     queue: list[tuple[float, int, tuple[tuple[bool, int], ...]]] = [(0.0, source, ())]
     settled: set[int] = set()
     while queue:
@@ -108,13 +131,24 @@ def _way(network: RoadNetwork, lengths_m: FloatArray, source: int, target: int) 
         through = float(lengths_m[lane]) if way else 0.0
         for after in network.successors(lane):
             heapq.heappush(queue, (cost + through, int(after), (*way, (False, int(after)))))
-        for beside in (int(network.left_lane[lane]), int(network.right_lane[lane])):
-            if beside >= 0:
-                heapq.heappush(queue, (cost + SIDE_STEP_COST_M, beside, (*way, (True, beside))))
-    names = network.lane_ids[source], network.lane_ids[target]
-    raise HippodromeError(
-        f"ego: SUMO moved it from lane {names[0]} to {names[1]}, which are not connected; check the network there"
-    )
+        sides = [int(side) for side in (network.left_lane[lane], network.right_lane[lane]) if side >= 0]
+        for beside in [*sides, *(_beside_in_junction(network, lane) if in_junctions else ())]:
+            heapq.heappush(queue, (cost + SIDE_STEP_COST_M, beside, (*way, (True, beside))))
+    return None
+
+
+def _beside_in_junction(network: RoadNetwork, lane: int) -> list[int]:
+    """The lanes beside a lane inside a junction, on the same edge, by the numbers at the ends of their names."""
+    if not network.is_internal[lane]:
+        return []
+    edge, number = network.lane_edge[lane], _number_on_edge(network, lane)
+    near = (other for other in (lane - 1, lane + 1) if 0 <= other < network.lane_count and network.lane_edge[other] == edge)
+    return [other for other in near if abs(_number_on_edge(network, other) - number) == 1]
+
+
+def _number_on_edge(network: RoadNetwork, lane: int) -> int:
+    digits = network.lane_ids[lane].rpartition("_")[2]
+    return int(digits) if digits.isdecimal() else -1
 
 
 def _distance(log: LaneLog, groups: list[tuple[int, int]], pieces: list[Piece], piece_of_group: list[int]) -> FloatArray:

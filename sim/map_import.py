@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-import re
 import tempfile
 import zlib
 from pathlib import Path
@@ -12,7 +11,11 @@ from typing import Final
 
 from hippodrome._files import replacing, sha256_of, write_atomically
 from hippodrome.core.types import HippodromeError
+from hippodrome.sim.driving_side import Choice, DrivingSide, opendrive_side, osm_side
+from hippodrome.sim.netconvert_notes import SPIRALS, netconvert_notes
+from hippodrome.sim.opendrive import with_arcs_for_arcs, with_lanes_swapped
 from hippodrome.sim.sumo_tools import run_tool
+from hippodrome.sim.xml_head import root_of
 
 SUMO: Final = (".net.xml", ".net.xml.gz")
 OSM: Final = (".osm", ".osm.xml", ".osm.gz", ".osm.xml.gz", ".osm.bz2", ".osm.xml.bz2", ".osm.pbf", ".pbf")
@@ -21,8 +24,10 @@ IMPORTED: Final = (*OSM, *OPENDRIVE)
 KNOWN: Final = (*SUMO, *IMPORTED)
 MAX_UNPACKED_BYTES: Final = 512 << 20  # a city of a million; netconvert needs some ten times as much memory
 PIECE_BYTES: Final = 1 << 20
-MAX_NOTES: Final = 5  # kinds of warnings that are shown; the rest is counted
-STRAIGHT_ENOUGH_M: Final = 1e-3  # a spiral that bends away from an arc by less is taken for one, which netconvert can compute
+IMPORT: Final = "import:"  # begins the notes on an import that are complete in themselves
+CURVE_RESOLUTION: Final = "--opendrive.curve-resolution"
+LEFT_HAND: Final = ("--lefthand=true",)
+IMPORTER: Final = 2  # raised where an import comes out otherwise than before, so that none made before is taken for it
 ISOLATED: Final = "--remove-edges.isolated=true"
 
 # What SUMO's own OSM web wizard sets, as far as it concerns cars, and no more.
@@ -42,7 +47,7 @@ OSM_OPTIONS: Final[tuple[str, ...]] = (
 )
 OPENDRIVE_OPTIONS: Final[tuple[str, ...]] = (
     "--keep-edges.by-vclass=passenger",
-    "--opendrive.curve-resolution=1",  # m between points of an arc: 2 cm off at 6 m radius
+    f"{CURVE_RESOLUTION}=1",  # m between points of an arc: 2 cm off at 6 m radius
     "--geometry.min-dist=0.5",  # where arcs meet lines, points lie on one another
     "--junctions.corner-detail=5",
 )
@@ -53,12 +58,13 @@ def is_foreign(name: str) -> bool:
     return name.lower().endswith(IMPORTED)
 
 
-def sumo_network(source: Path, folder: Path) -> tuple[Path, tuple[str, ...]]:
+def sumo_network(source: Path, folder: Path, driving_side: Choice = "auto") -> tuple[Path, tuple[str, ...]]:
     """A road network of any kind as a SUMO network.
 
     Args:
         source: A SUMO network, which is taken as it is, or a map of another maker, which is imported once.
         folder: Where an imported network lies, under a name that its content and our options give.
+        driving_side: Where its traffic keeps; ``auto``: as the map says. A SUMO network says it itself.
 
     Returns:
         The network's file, and netconvert's notes about a map that was imported, those of an earlier import included.
@@ -68,25 +74,26 @@ def sumo_network(source: Path, folder: Path) -> tuple[Path, tuple[str, ...]]:
     """
     if not is_foreign(source.name):
         return source, ()
-    net_file = folder / f"{source.name.partition('.')[0]}-{import_recipe(source)}.net.xml.gz"
+    net_file = folder / f"{source.name.partition('.')[0]}-{import_recipe(source, driving_side)}.net.xml.gz"
     notes_file = net_file.with_name(net_file.name.removesuffix(".net.xml.gz") + ".notes.txt")
     if not net_file.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        notes = import_map(source, net_file)
+        notes = import_map(source, net_file, driving_side)
         if notes:
             write_atomically(notes_file, "".join(f"{note}\n" for note in notes).encode())
         return net_file, notes
     return net_file, tuple(notes_file.read_text(encoding="utf-8").splitlines()) if notes_file.exists() else ()
 
 
-def import_recipe(source: Path) -> str:
+def import_recipe(source: Path, driving_side: Choice = "auto") -> str:
     """What the import of a map depends on, in twelve digits."""
     if not source.is_file():
         raise HippodromeError(f"{source}: no such file; give {', '.join(KNOWN)}")
-    return hashlib.sha256(repr((sha256_of(source), OSM_OPTIONS, OPENDRIVE_OPTIONS)).encode()).hexdigest()[:12]
+    recipe = sha256_of(source), OSM_OPTIONS, OPENDRIVE_OPTIONS, IMPORTER, driving_side
+    return hashlib.sha256(repr(recipe).encode()).hexdigest()[:12]
 
 
-def import_map(source: Path, net_file: Path) -> tuple[str, ...]:
+def import_map(source: Path, net_file: Path, driving_side: Choice = "auto") -> tuple[str, ...]:
     """Write ``source`` as the SUMO network ``net_file`` (.net.xml.gz); the same map, the same bytes.
 
     Returns what netconvert warned of and what was done about it, one line for each kind of warning.
@@ -102,25 +109,17 @@ def import_map(source: Path, net_file: Path) -> tuple[str, ...]:
         ending = ".osm" if source.name.lower().endswith(OSM) else ".xodr"
         plain, made = Path(folder) / f"map{ending}", Path(folder) / "made.net.xml"
         _unpack(source, plain)
-        notes = _convert(source, plain, made)
+        root_of(plain, named=source)
+        notes = _convert(source, plain, made, driving_side)
         with replacing(net_file) as temporary:
             temporary.write_bytes(gzip.compress(_without_comments(made.read_text(encoding="utf-8")).encode(), mtime=0))
     return notes
 
 
-def _convert(source: Path, plain: Path, made: Path) -> tuple[str, ...]:
+def _convert(source: Path, plain: Path, made: Path, choice: Choice) -> tuple[str, ...]:
     """netconvert's network of a map, and the notes on it. Roads that join no other are kept where there is nothing else."""
-    if plain.suffix == ".xodr":
-        straightened = _with_arcs_for_arcs(plain)
-        notes = _netconvert(source, plain, made, OPENDRIVE_OPTIONS)
-        if straightened:
-            notes = (f"{straightened} spiral(s) of constant curvature were read as arcs or lines", *notes)
-    else:
-        notes = _netconvert(source, plain, made, OSM_OPTIONS)
-        if not _has_roads(made):
-            made.unlink(missing_ok=True)
-            _netconvert(source, plain, made, tuple(option for option in OSM_OPTIONS if option != ISOLATED))
-            notes = ("no road of it joins another one; such roads are left out elsewhere, here they are all there is and kept",)
+    convert = _convert_opendrive if plain.suffix == ".xodr" else _convert_osm
+    notes = convert(source, plain, made, choice)
     if not _has_roads(made):
         raise HippodromeError(
             f"{source}: holds no roads for cars (footways, tracks and service roads are none); choose a larger extract"
@@ -128,24 +127,77 @@ def _convert(source: Path, plain: Path, made: Path) -> tuple[str, ...]:
     return notes
 
 
+def _convert_osm(source: Path, plain: Path, made: Path, choice: Choice) -> tuple[str, ...]:
+    side = osm_side(plain) if choice == "auto" else DrivingSide(choice)
+    options = (*OSM_OPTIONS, *(LEFT_HAND if side.side == "left" else ()))
+    notes = _netconvert(source, plain, made, options)
+    if not _has_roads(made):
+        made.unlink(missing_ok=True)
+        _netconvert(source, plain, made, tuple(option for option in options if option != ISOLATED))
+        notes = (
+            f"{IMPORT} no road of it joins another one; such roads are left out elsewhere, here they are all there is and kept",
+        )
+    return (*_side_notes(side), *notes)
+
+
+def _convert_opendrive(source: Path, plain: Path, made: Path, choice: Choice) -> tuple[str, ...]:
+    """Arcs are followed finely; where netconvert cannot do that, with its own default."""
+    side = opendrive_side(plain) if choice == "auto" else DrivingSide(choice)
+    straightened = with_arcs_for_arcs(plain)
+    if side.side == "left":
+        try:
+            with_lanes_swapped(plain)
+        except HippodromeError as error:
+            raise HippodromeError(f"{source}: {error}; write it again with the tool that made it") from error
+    options = (*OPENDRIVE_OPTIONS, *(LEFT_HAND if side.side == "left" else ()))
+    arcs = (f"{IMPORT} {straightened} spiral(s) of constant curvature were read as arcs or lines",) if straightened else ()
+    try:
+        notes = _netconvert(source, plain, made, options)
+    except HippodromeError as error:
+        coarser = tuple(option for option in options if not option.startswith(CURVE_RESOLUTION))
+        try:
+            notes = _netconvert(source, plain, made, coarser)
+        except HippodromeError:
+            raise error from None
+        notes = (f"{IMPORT} netconvert could not follow its arcs metre by metre and drew them more coarsely", *notes)
+    return (*arcs, *_side_notes(side), *notes)
+
+
+def _side_notes(side: DrivingSide) -> tuple[str, ...]:
+    if not side.reason:
+        return ()
+    other = "right" if side.side == "left" else "left"
+    return (
+        f"{IMPORT} traffic keeps {side.side}, for {side.reason}; if that is wrong, set town.driving_side: {other}, or "
+        f"give scenario new --driving-side {other}",
+    )
+
+
 def _netconvert(source: Path, plain: Path, made: Path, options: tuple[str, ...]) -> tuple[str, ...]:
     """Run netconvert, and what it warned of. It writes no file where there is no road. Raises HippodromeError."""
     log = made.with_name("warnings.txt")
     kind = "osm" if plain.suffix == ".osm" else "opendrive"
+    files = f"--{kind}-files={plain}", f"--output-file={made}", f"--error-log={log}"
     try:
-        run_tool("netconvert", f"--{kind}-files={plain}", *options, f"--output-file={made}", f"--error-log={log}")
+        run_tool("netconvert", *files, *options, input_bytes=plain.stat().st_size)
     except HippodromeError as error:
         if "No edges loaded" in str(error):
             return ()
-        raise HippodromeError(f"{source}: cannot be imported: {_with_cure(str(error))}") from error
-    return _summed_up(log.read_text(encoding="utf-8", errors="replace").splitlines()) if log.exists() else ()
+        raise HippodromeError(f"{source}: cannot be imported: {_with_cure(str(error), log)}") from error
+    return netconvert_notes(_lines(log), made)
 
 
-def _with_cure(reason: str) -> str:
-    """netconvert's complaint; where it says nothing that a user understands, with what usually helps."""
-    if "bad_alloc" in reason:
-        return f"{reason}: netconvert ran out of memory on a curve; write its spirals as arcs, or choose a smaller extract"
-    return reason
+def _lines(log: Path) -> list[str]:
+    return log.read_text(encoding="utf-8", errors="replace").splitlines() if log.exists() else []
+
+
+def _with_cure(reason: str, log: Path) -> str:
+    """netconvert's complaint, with what usually helps."""
+    if any(SPIRALS in line for line in _lines(log)):
+        return f"{reason}: it cannot draw a spiral of it; write its spirals as arcs"
+    if "bad_alloc" in reason or "crashed" in reason or "no answer" in reason:
+        return f"{reason}: in general it is a curve or a number that cannot be; look for it, or cut out a smaller area"
+    return f"{reason}: correct this place of the map, or write it again with the tool that made it"
 
 
 def _has_roads(made: Path) -> bool:
@@ -154,52 +206,6 @@ def _has_roads(made: Path) -> bool:
         return False
     with made.open(encoding="utf-8") as lines:
         return any("<edge " in line and 'function="' not in line for line in lines)
-
-
-def _summed_up(log: list[str]) -> tuple[str, ...]:
-    """Warnings that differ in names and numbers only, as one note with the first of them and their number."""
-    kinds: dict[str, list[str]] = {}
-    for line in log:
-        if line.startswith("Warning: "):
-            text = line.removeprefix("Warning: ").strip()
-            kinds.setdefault(re.sub(r"'[^']*'|[-\d.]+", "#", text), []).append(text)
-    notes = [f"netconvert: {same[0]}" + (f" ({len(same)} of this kind)" if len(same) > 1 else "") for same in kinds.values()]
-    more = [f"netconvert: {len(notes) - MAX_NOTES} more kinds of warnings"] if len(notes) > MAX_NOTES else []
-    return (*notes[:MAX_NOTES], *more)
-
-
-SPIRAL: Final = re.compile(r'(<geometry\b[^>]*\blength="([^"]+)"[^>]*>\s*)<spiral\b([^>]*?)(?:/>|>\s*</spiral>)')
-CURVATURE: Final = re.compile(r'\b(curvStart|curvEnd)="([^"]+)"')
-
-
-def _with_arcs_for_arcs(plain: Path) -> int:
-    """Write spirals that are arcs as arcs, in place, and count them: netconvert divides by the change of their curvature.
-
-    A spiral of length L whose curvature changes by c lies within |c| L^2 / 8 of the arc of its mean curvature: the heading
-    differs by at most |c| L / 8.
-    """
-    text = plain.read_text(encoding="utf-8", errors="surrogateescape")
-    if "<spiral" not in text:
-        return 0
-    count = 0
-
-    def arc(match: re.Match[str]) -> str:
-        nonlocal count
-        try:
-            length_m = float(match[2])
-            curvature = {name: float(value) for name, value in CURVATURE.findall(match[3])}
-            change, mean = curvature["curvEnd"] - curvature["curvStart"], 0.5 * (curvature["curvEnd"] + curvature["curvStart"])
-        except (ValueError, KeyError):
-            return match[0]  # netconvert says what is wrong with it
-        if not abs(change) * length_m**2 / 8.0 < STRAIGHT_ENOUGH_M:
-            return match[0]
-        count += 1
-        return f'{match[1]}<arc curvature="{mean!r}"/>' if abs(mean) * length_m > 1e-9 else f"{match[1]}<line/>"
-
-    changed = SPIRAL.sub(arc, text)
-    if count:
-        plain.write_text(changed, encoding="utf-8", errors="surrogateescape")
-    return count
 
 
 def _without_comments(text: str) -> str:

@@ -2,34 +2,22 @@
 
 from __future__ import annotations
 
-import gzip
 import math
-import zlib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Final, TypeAlias
-from xml.parsers import expat
-from xml.sax import SAXException, parse
+from typing import Final
 
 import numpy as np
-import sumolib
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
-
-SumoNet: TypeAlias = Any  # sumolib.net.Net: sumolib has no types
-SumoLane: TypeAlias = Any
+from hippodrome.sim.net_file import SumoLane, SumoNet, is_left_hand, load_net
 
 MIN_LANE_M: Final = 0.01  # SUMO writes coordinates in centimetres; a shorter lane is a point
 MAX_CHAIN: Final = 6  # internal lanes in a row; netconvert makes up to three
 HELD_PHASE_S: Final = 150.0  # no driver waits that long: such a traffic light is meant to be switched by hand
-COINCIDENT_M: Final = 1.0  # nodes closer than this are one crossing to a driver
-SUMO_TRUE: Final = {"true", "1", "yes", "on", "x", "t"}  # what SUMO reads as true, in any case of letters
-PIECE_BYTES: Final = 1 << 14
-MAX_HEAD_BYTES: Final = 64 << 20  # of comments before the root element
 
 
 def read_network(net_file: Path | str) -> RoadNetwork:
@@ -46,32 +34,6 @@ def read_network(net_file: Path | str) -> RoadNetwork:
     """
     net_file = Path(net_file)
     return road_network(load_net(net_file), net_file)
-
-
-def load_net(net_file: Path) -> SumoNet:
-    """``sumolib``'s network, internal lanes included; every way of being unreadable is one ``HippodromeError``."""
-    _reject_foreign(net_file)
-    try:
-        with gzip.open(net_file) if _is_packed(net_file) else net_file.open("rb") as stream:
-            reader = _NetReader(withInternal=True, withFoes=False, withPrograms=True, withMacroConnectors=True)
-            parse(stream, reader)
-        net = reader.getNet()
-        net.initRoutingCache(1000)  # as sumolib.net.readNet does
-        return net
-    except (SAXException, OSError, EOFError, zlib.error) as error:
-        raise HippodromeError(f"{net_file}: broken network ({_one_line(error)}); write it again with netconvert") from error
-    except (KeyError, AttributeError, ValueError, TypeError, IndexError) as error:
-        reason = f"{type(error).__name__} {_one_line(error)}"
-        raise HippodromeError(f"{net_file}: not a consistent SUMO network ({reason}); write it again with netconvert") from error
-
-
-class _NetReader(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has no types
-    """sumolib's reader, which takes the offset of a traffic light for a number; SUMO also knows ``begin``. We use none."""
-
-    def startElement(self, name: str, attrs: Any) -> None:
-        if name == "tlLogic" and attrs.get("offset") == "begin":
-            attrs = {**dict(attrs.items()), "offset": "0"}
-        super().startElement(name, attrs)
 
 
 def road_network(net: SumoNet, net_file: Path) -> RoadNetwork:
@@ -102,16 +64,10 @@ def road_network(net: SumoNet, net_file: Path) -> RoadNetwork:
     )
 
 
-def is_left_hand(net_file: Path) -> bool:
-    """Driving side, from the ``<net lefthand=...>`` attribute, which sumolib does not keep; read as SUMO reads booleans."""
-    _, attributes = _root(net_file)
-    return attributes.get("lefthand", "").lower() in SUMO_TRUE
-
-
 def drivable_edges(network: RoadNetwork) -> IntArray:
     """Edges, as sorted indices, of the longest strongly connected part: whoever starts there can always go on and come back."""
     source, target = edge_links(network)
-    part = _parts(len(network.edge_ids), source, target, "strong")
+    part = graph_parts(len(network.edge_ids), source, target, "strong")
     length = edge_lengths_m(network)
     weight = np.bincount(part, weights=length)
     loops = np.bincount(part[source[part[source] == part[target]]], minlength=len(weight)) > 0
@@ -159,15 +115,6 @@ def junction_lengths_m(network: RoadNetwork) -> FloatArray:
     return mean
 
 
-def check_network(net: SumoNet, network: RoadNetwork, net_file: Path) -> tuple[str, ...]:
-    """What is odd about a network but can be lived with, one line each. A network without any loop to drive is an error."""
-    drivable = drivable_edges(network)
-    if len(drivable) == 0:
-        raise HippodromeError(f"{net_file}: no closed loop for passenger cars, so no tour can return; add a way round or U-turns")
-    gaps = junction_gaps(network, net_file)
-    return (*gaps, *_disconnected(network, drivable), *_zero_length(network), *_coincident(net), *_held_signals(net))
-
-
 def junction_gaps(network: RoadNetwork, net_file: Path) -> tuple[str, ...]:
     """A note if the network has roads that follow one another but no lanes inside of its junctions, else nothing."""
     if network.is_internal.any() or len(network.successor) == 0:
@@ -179,47 +126,7 @@ def junction_gaps(network: RoadNetwork, net_file: Path) -> tuple[str, ...]:
     )
 
 
-def _disconnected(network: RoadNetwork, drivable: IntArray) -> Iterable[str]:
-    length = edge_lengths_m(network)
-    roads = np.flatnonzero(length > 0.0)
-    rest = np.setdiff1d(roads, drivable)
-    if len(rest) == 0:
-        return
-    share = length[rest].sum() / length.sum()
-    source, target = edge_links(network)
-    parts = len(np.unique(_parts(len(network.edge_ids), source, target, "weak")[roads]))
-    example = network.edge_ids[rest[np.argmax(length[rest])]]
-    yield (
-        f"{len(rest)} of {len(roads)} edges ({share:.0%} of the length, for instance {example}) cannot be left or reached again "
-        f"and are not toured; {parts} disconnected part(s)"
-    )
-
-
-def _zero_length(network: RoadNetwork) -> Iterable[str]:
-    points = np.flatnonzero(network.lane_lengths_m() <= 1.5 * MIN_LANE_M)
-    if len(points):
-        yield f"{len(points)} zero-length lane(s), for instance {network.lane_ids[points[0]]}, stretched to {MIN_LANE_M} m"
-
-
-def _coincident(net: SumoNet) -> Iterable[str]:
-    nodes = [node for node in net.getNodes() if node.getIncoming() or node.getOutgoing()]
-    pairs = KDTree(np.array([node.getCoord()[:2] for node in nodes])).query_pairs(COINCIDENT_M)
-    for a, b in sorted(pairs):
-        one, other = nodes[a], nodes[b]
-        joined = {edge.getToNode() for edge in one.getOutgoing()} | {edge.getFromNode() for edge in one.getIncoming()}
-        if other not in joined:
-            x_m, y_m = one.getCoord()[:2]
-            yield f"nodes {one.getID()} and {other.getID()} coincide at ({x_m:.1f}, {y_m:.1f}) m but are not connected"
-
-
-def _held_signals(net: SumoNet) -> Iterable[str]:
-    programs = ((signal, program) for signal in net.getTrafficLights() for program in signal.getPrograms().values())
-    held = {signal.getID() for signal, program in programs if any(p.duration > HELD_PHASE_S for p in program.getPhases())}
-    if held:
-        yield f"{len(held)} traffic light(s), for instance {min(held)}, wait for a hand to switch them and are given a cycle"
-
-
-def _parts(count: int, source: IntArray, target: IntArray, connection: str) -> IntArray:
+def graph_parts(count: int, source: IntArray, target: IntArray, connection: str) -> IntArray:
     graph = coo_array((np.ones(len(source)), (source, target)), shape=(count, count))
     _, part = connected_components(graph, connection=connection)
     labels: IntArray = part
@@ -286,43 +193,3 @@ def _stretched(point_m: FloatArray, heading_rad: float) -> FloatArray:
 
 def _starts(groups: Iterable[FloatArray | list[int]]) -> IntArray:
     return np.concatenate([[0], np.cumsum([len(group) for group in groups])]).astype(np.int32)
-
-
-def _reject_foreign(net_file: Path) -> None:
-    if not net_file.is_file():
-        raise HippodromeError(f"{net_file}: no such network file; give a SUMO .net.xml or .net.xml.gz")
-    tag, _ = _root(net_file)
-    if tag == "net":
-        return
-    if tag in ("osm", "OpenDRIVE"):
-        kind = ".osm" if tag == "osm" else ".xodr"
-        raise HippodromeError(f"{net_file}: not a SUMO network but a map to convert; name it {kind} and netconvert is run")
-    raise HippodromeError(f"{net_file}: not a SUMO network (no <net> element); give a .net.xml or .net.xml.gz")
-
-
-def _root(net_file: Path) -> tuple[str, dict[str, str]]:
-    """Name and attributes of the root element, however long the comments before it; an empty name where there is none."""
-    found: list[tuple[str, dict[str, str]]] = []
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = lambda name, attributes: found.append((name, attributes))
-    try:
-        with gzip.open(net_file) if _is_packed(net_file) else net_file.open("rb") as stream:
-            for _ in range(MAX_HEAD_BYTES // PIECE_BYTES):
-                piece = stream.read(PIECE_BYTES)
-                parser.Parse(piece, not piece)
-                if found or not piece:
-                    break
-    except expat.ExpatError:
-        pass  # the root may stand before what is broken, and else there is none
-    except (OSError, EOFError, zlib.error) as error:
-        raise HippodromeError(f"{net_file}: unreadable ({_one_line(error)}); check the file") from error
-    return found[0] if found else ("", {})
-
-
-def _is_packed(net_file: Path) -> bool:
-    with net_file.open("rb") as stream:
-        return stream.read(2) == b"\x1f\x8b"
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())

@@ -9,7 +9,8 @@ import libsumo
 import numpy as np
 
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import HippodromeError, IntArray
+from hippodrome.core.types import FloatArray, HippodromeError, IntArray
+from hippodrome.sim.blockage import clear_around, ego_is_waiting, red_signal, send_ego_again, what_holds_ego
 from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M, EgoSpec, comfortable_speed_mps
 from hippodrome.sim.lane_log import LaneLog, driven_edges, lane_pieces, lanes_ahead, ways_out, ways_to_edge
 from hippodrome.sim.path import STEP_M, Piece, piece_of_samples, piece_starts, smooth_path
@@ -19,11 +20,16 @@ from hippodrome.sim.types import TrafficLog
 
 WARM_UP_S: Final = 20.0  # traffic spreads before the ego enters
 ENTRY_PATIENCE_S: Final = 120.0  # for a gap to enter the road
-STUCK_AFTER_S: Final = 180.0  # longer than any red light
+CLEARED_AFTER_S: Final = 20.0  # so long traffic is waited for at the entrance; then it is taken away there
+STUCK_AFTER_S: Final = 180.0  # longer than a red light; at a light twice as long is waited
+MOST_CLEARINGS: Final = 20  # in one drive: each costs three minutes, and a network that needs more of them is not drivable
 SIGHT_AHEAD_M: Final = 80.0  # braking from 50 km/h at 2 m/s^2 takes 50 m
 SIGHT_BEHIND_M: Final = 15.0  # the bend that the rear axle is still in
 REFILL_STEPS: Final = 10  # traffic is topped up once a second
 LAST_CHANCE_M: Final = 8.0  # a turn is given up this long before the car would have to stop for it
+LAST_EDGE_M: Final = 60.0  # a tour that is not done is planned on this long before its end
+COUNTED_OTHERWISE: Final = 0.1  # beyond it a network's own lengths of its lanes are meant to differ from the drawing
+SLOWEST_SCALE: Final = 0.1  # metres drawn per metre counted; lanes below it are points
 SPARE_M: Final = 200.0  # planned beyond the tour's length, so that SUMO's ego does not leave the road before
 
 
@@ -62,47 +68,79 @@ class Pilot:
         self._network, self._graph, self._area, self._tour, self._ego, self._rng = network, graph, area, tour, ego, rng
         self._lane_number = {name: i for i, name in enumerate(network.lane_ids)}
         self._lengths_m, self._length_factors = network.lane_lengths_m(), drawn_length_factors(network)
+        self._drawn_share = _drawn_share(network, self._length_factors)
         self._route: list[int] = []  # edges of the network
         self._leads_on = True  # the present lane leads to the route's next edge
         self._cap_mps, self._cap_offset_m = np.zeros(1), 0.0
+        self._clearings = 0
         self._entries: list[int] = []  # steps at which the view ahead was renewed, in general on a new lane
         self._log = DriveLog()
 
     def drive(self, others: BackgroundTraffic) -> DriveLog:
-        """Until the tour is done."""
+        """Until the tour is done. Raises HippodromeError where the ego cannot enter the road or go on."""
         self._enter(others)
         standing_steps = 0
-        while EGO in libsumo.vehicle.getIDList() and not self._is_done():
+        while EGO in libsumo.vehicle.getIDList():
+            if self._is_done():
+                return self._log
             self._write_down(others)
             if len(self._log.lane) == 1 or self._log.lane[-1] != self._log.lane[-2]:
                 self._look_ahead()
-            if self._turn_is_missed():
+            if self._turn_is_missed() or self._route_ends():
                 self._replan()
             self._set_speed()
             standing_steps = standing_steps + 1 if self._log.speed_mps[-1] < 0.1 else 0
-            if standing_steps * SUMO_STEP_S > STUCK_AFTER_S:
-                raise HippodromeError(
-                    f"edge {libsumo.vehicle.getRoadID(EGO)}: the ego has been standing for {STUCK_AFTER_S:.0f} s; "
-                    f"lower traffic.vehicles or check the junction behind this edge"
-                )
+            standing_s = standing_steps * SUMO_STEP_S
+            if standing_s > 2.0 * STUCK_AFTER_S or (standing_s > STUCK_AFTER_S and not red_signal()):
+                self._free(standing_s)
+                standing_steps = 0
             if len(self._log.lane) % REFILL_STEPS == 0:
                 others.refill(ego_on_road=True)
             libsumo.simulationStep()
-        return self._log
+        last = self._network.edge_ids[self._network.lane_edge[self._log.lane[-1]]]
+        raise HippodromeError(
+            f"edge {last}: SUMO took the ego off the road before its tour was done; set another seed, or check it in netedit"
+        )
+
+    def _free(self, standing_s: float) -> None:
+        """Traffic in a knot with the ego is taken off the road. Raises HippodromeError where it is not traffic that holds it."""
+        edge = libsumo.vehicle.getRoadID(EGO)
+        if red_signal() or clear_around(*libsumo.vehicle.getPosition(EGO)) == 0:
+            raise HippodromeError(f"edge {edge}: the ego has been standing for {standing_s:.0f} s: {what_holds_ego()}")
+        self._clearings += 1
+        if self._clearings > MOST_CLEARINGS:
+            raise HippodromeError(
+                f"edge {edge}: traffic had to be taken away round the ego {MOST_CLEARINGS} times and it stands again for "
+                f"{STUCK_AFTER_S:.0f} s; lower traffic.vehicles"
+            )
 
     def _enter(self, others: BackgroundTraffic) -> None:
-        """Lets traffic spread, then waits for the ego's place on the road."""
+        """Lets traffic spread, then waits for the ego's place on the road, and makes room where there is none for long."""
         self._route = self._network_edges(plan_tour(self._graph, self._area, self._plan_length_m(), self._rng))
         for step in range(round((WARM_UP_S + ENTRY_PATIENCE_S) / SUMO_STEP_S)):
             if step == round(WARM_UP_S / SUMO_STEP_S):
                 add_vehicle(EGO, "ego", self._network, self._route, "base")
             elif step % REFILL_STEPS == 0:
-                others.refill(ego_on_road=step * SUMO_STEP_S > WARM_UP_S)
+                sent_s = step * SUMO_STEP_S - WARM_UP_S
+                others.refill(ego_on_road=sent_s > 0.0)
+                if sent_s > 0.0 and not ego_is_waiting():
+                    if sent_s > CLEARED_AFTER_S:
+                        clear_around(*self._entrance_m())
+                    send_ego_again()
             libsumo.simulationStep()
             if EGO in libsumo.vehicle.getIDList():
                 return
         edge = self._network.edge_ids[self._route[0]]
-        raise HippodromeError(f"edge {edge}: no room for the ego within {ENTRY_PATIENCE_S:.0f} s; lower traffic.vehicles")
+        raise HippodromeError(
+            f"edge {edge}: SUMO lets the ego not begin there within {ENTRY_PATIENCE_S:.0f} s, though traffic was taken away; "
+            f"set another seed, or check the lanes of this edge in netedit"
+        )
+
+    def _entrance_m(self) -> tuple[float, float]:
+        """Where the ego's route begins."""
+        lane = int(np.flatnonzero(self._network.lane_edge == self._route[0])[0])
+        x_m, y_m = self._network.lane_points_m(lane)[0]
+        return float(x_m), float(y_m)
 
     def _plan_length_m(self) -> float:
         if self._tour.length_m is None and self._tour.duration_s is not None:
@@ -113,7 +151,7 @@ class Pilot:
         if self._tour.duration_s is not None and len(self._log.lane) * SUMO_STEP_S > self._tour.duration_s:
             return True
         by_time_only = self._tour.length_m is None and self._tour.duration_s is not None
-        return not by_time_only and libsumo.vehicle.getDistance(EGO) >= self._tour.planned_length_m()
+        return not by_time_only and libsumo.vehicle.getDistance(EGO) * self._drawn_share >= self._tour.planned_length_m()
 
     def _write_down(self, others: BackgroundTraffic) -> None:
         name = libsumo.vehicle.getLaneID(EGO)
@@ -158,7 +196,8 @@ class Pilot:
         """No faster than what the rear axle's place on the path allows; SUMO adds right of way and the cars ahead."""
         where = (self._log.position_m[-1] + self._cap_offset_m) / STEP_M
         k = min(max(int(where), 0), len(self._cap_mps) - 1)
-        libsumo.vehicle.setSpeed(EGO, float(self._cap_mps[k]))
+        scale = 1.0 if self._drawn_share == 1.0 else max(float(self._length_factors[self._log.lane[-1]]), SLOWEST_SCALE)
+        libsumo.vehicle.setSpeed(EGO, float(self._cap_mps[k]) / scale)
 
     def _turn_is_missed(self) -> bool:
         """On a lane that does not lead where the route goes, too near its end to change."""
@@ -167,6 +206,13 @@ class Pilot:
         left_m = float(self._lengths_m[self._log.lane[-1]]) - self._log.position_m[-1]
         braking_m = self._log.speed_mps[-1] ** 2 / (2.0 * self._ego.decel_mps2)
         return left_m < braking_m + LAST_CHANCE_M
+
+    def _route_ends(self) -> bool:
+        """On the last edge of the route, near its end, though the tour is not done: SUMO counts the lanes shorter than drawn."""
+        lane = self._log.lane[-1]
+        if self._network.is_internal[lane] or self._onward_edges():
+            return False
+        return float(self._lengths_m[lane]) - self._log.position_m[-1] < LAST_EDGE_M
 
     def _replan(self) -> None:
         """The rest of the tour anew, from where the present lane leads; with no such place SUMO must get the lane change done."""
@@ -192,3 +238,10 @@ class Pilot:
 
     def _network_edges(self, tour: IntArray) -> list[int]:
         return [int(edge) for edge in self._graph.edges[tour]]
+
+
+def _drawn_share(network: RoadNetwork, factors: FloatArray) -> float:
+    """Metres drawn per metre that SUMO counts, over all roads; 1 where the two agree about as well as they do in any network."""
+    drawn_m = np.where(network.is_internal, 0.0, network.lane_lengths_m())
+    share = float(drawn_m.sum() / (drawn_m / factors).sum())
+    return share if abs(share - 1.0) > COUNTED_OTHERWISE else 1.0

@@ -15,6 +15,7 @@ import numpy as np
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 from hippodrome.sim.network import HELD_PHASE_S
+from hippodrome.sim.sumo_tools import without_comma
 from hippodrome.sim.tour import TourGraph
 from hippodrome.sim.traffic import KIND_SHARES, VEHICLE_SIZES_M, TrafficSpec, random_trip
 
@@ -29,11 +30,11 @@ SIGHT_M: Final = 150.0  # vehicles farther from the ego are not logged
 @contextmanager
 def sumo_run(net_file: Path, vehicle_types: str, seed: int) -> Iterator[None]:
     """Starts SUMO on a network in this process and closes it whatever happens."""
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, without_comma(net_file) as named:
         types_file = Path(folder) / "types.add.xml"
         types_file.write_text(vehicle_types, encoding="utf-8")
         options = (
-            f"--net-file={_without_comma(net_file, Path(folder))}",
+            f"--net-file={named}",
             f"--additional-files={types_file}",
             f"--seed={seed % 2**31}",
             f"--step-length={SUMO_STEP_S}",
@@ -57,15 +58,6 @@ def sumo_run(net_file: Path, vehicle_types: str, seed: int) -> Iterator[None]:
             libsumo.close()
 
 
-def _without_comma(net_file: Path, folder: Path) -> Path:
-    """The network by a name that SUMO does not take for several files: a link in ``folder`` if there is a comma in its path."""
-    if "," not in str(net_file):
-        return net_file
-    link = folder / f"town{'.net.xml.gz' if net_file.suffix == '.gz' else '.net.xml'}"
-    link.symlink_to(net_file.resolve())
-    return link
-
-
 def _let_signals_run() -> None:
     """Signals made to be switched by hand get one program that goes through all phases of all their programs by itself."""
     for signal in libsumo.trafficlight.getIDList():
@@ -82,6 +74,7 @@ class BackgroundTraffic:
     def __init__(
         self, spec: TrafficSpec, network: RoadNetwork, graph: TourGraph, area: IntArray, rng: np.random.Generator
     ) -> None:
+        area = _without_shared_lanes(network, graph, area)
         self._network, self._graph, self._area, self._rng = network, graph, area, rng
         self._wanted = min(spec.vehicles, int(graph.length_m[area].sum() / ROOM_PER_VEHICLE_M))
         self._kind: list[int] = []  # of each vehicle sent so far, its identity being its number
@@ -113,6 +106,12 @@ class BackgroundTraffic:
             poses.append((x - half * math.cos(heading), y - half * math.sin(heading), heading))
             kinds.append(self._kind[number])
         return ids, poses, kinds
+
+
+def _without_shared_lanes(network: RoadNetwork, graph: TourGraph, area: IntArray) -> IntArray:
+    """The edges of an area without those that share their lane with the other direction: whoever met there could not go on."""
+    shared = [bool(libsumo.edge.getBidiEdge(network.edge_ids[edge])) for edge in graph.edges[area]]
+    return area[~np.array(shared, dtype=np.bool_)]
 
 
 def add_vehicle(name: str, vehicle_type: str, network: RoadNetwork, edges: Sequence[int], depart_position: str) -> None:

@@ -16,13 +16,16 @@ import numpy as np
 from pydantic import Field
 
 from hippodrome._files import replacing
-from hippodrome.core.types import FloatArray
+from hippodrome.core.types import FloatArray, HippodromeError
+from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
-from hippodrome.sim.map_import import sumo_network
-from hippodrome.sim.network import SumoNet, check_network, is_left_hand, load_net, road_network
+from hippodrome.sim.map_import import LEFT_HAND, sumo_network
+from hippodrome.sim.net_file import SumoNet, check_places_to_wait, is_left_hand, load_net
+from hippodrome.sim.net_notes import check_network
+from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
 from hippodrome.sim.spec import Spec
-from hippodrome.sim.sumo_tools import run_tool
+from hippodrome.sim.sumo_tools import check_that_sumo_reads, run_tool
 from hippodrome.sim.types import Town
 
 LANE_WIDTH_M: Final = 3.2  # SUMO's default
@@ -50,25 +53,40 @@ class TownSpec(Spec):
     road_km: float = Field(4.39, ge=0.8, le=500.0)  # directed: a two-way street counts twice
     lanes: int = Field(1, ge=1, le=2)  # per direction
     speed_limit_mps: float = Field(8.33, ge=3.0, le=40.0)
-    network: Path | None = None  # a .net.xml, .net.xml.gz, .osm or .xodr (also .gz); overrides everything above
+    driving_side: Choice = "auto"  # auto: as the network or map says, and right where none does
+    network: Path | None = None  # a .net.xml, .net.xml.gz, .osm or .xodr (also .gz); overrides kind, sizes, lanes and limit
 
 
 def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
     """The town of a scenario. What is generated lies below ``work_dir``, named by its content's recipe, and is made once."""
     if spec.network is not None:
-        net_file, notes = sumo_network(spec.network, work_dir)
+        net_file, notes = sumo_network(spec.network, work_dir, spec.driving_side)
         town = read_town(net_file)
+        _check_side(spec.driving_side, town.left_hand, spec.network)
+        check_that_sumo_reads(net_file)
         return replace(town, notes=(*notes, *town.notes))
-    recipe = f"{spec.model_dump_json()} {rng_seed} {CONVERT_OPTIONS} {CROSSING_RADIUS_M} {THROUGH_RADIUS_M}"
+    what = spec.model_dump_json(exclude={"driving_side"} if spec.driving_side != "left" else None)
+    recipe = f"{what} {rng_seed} {CONVERT_OPTIONS} {CROSSING_RADIUS_M} {THROUGH_RADIUS_M}"
     net_file = work_dir / f"{spec.kind}-{hashlib.sha256(recipe.encode()).hexdigest()[:12]}.net.xml"
     if not net_file.exists():
         _write_plan_as_net(_plan(spec, rng_seed), spec, net_file)
     return read_town(net_file, name=spec.kind)
 
 
+def _check_side(choice: Choice, left_hand: bool, network: Path) -> None:
+    """A SUMO network's streets cannot change sides. Raises HippodromeError where they would have to."""
+    side = "left" if left_hand else "right"
+    if choice not in ("auto", side):
+        raise HippodromeError(
+            f"{network}: its traffic keeps {side}, town.driving_side says {choice}; leave the key out, or import again the map "
+            f"that the network was made of"
+        )
+
+
 def read_town(net_file: Path, name: str | None = None) -> Town:
     """A town from a SUMO network file, checked."""
     net = load_net(net_file)
+    check_places_to_wait(net, net_file)
     network = road_network(net, net_file)
     left_hand = is_left_hand(net_file)
     return Town(
@@ -135,9 +153,10 @@ def _write_plan_as_net(plan: Plan, spec: TownSpec, net_file: Path) -> None:
     """netconvert's network of a plan, atomically, and without its comments, which hold the date."""
     with tempfile.TemporaryDirectory() as folder:  # not beside the result: to netconvert a comma in a path separates two files
         nodes, edges, net = (Path(folder) / name for name in ("town.nod.xml", "town.edg.xml", "town.net.xml"))
+        options = (*CONVERT_OPTIONS, *(LEFT_HAND if spec.driving_side == "left" else ()))
         nodes.write_text(_nodes_xml(plan), encoding="utf-8")
         edges.write_text(_edges_xml(plan, spec), encoding="utf-8")
-        run_tool("netconvert", f"--node-files={nodes}", f"--edge-files={edges}", f"--output-file={net}", *CONVERT_OPTIONS)
+        run_tool("netconvert", f"--node-files={nodes}", f"--edge-files={edges}", f"--output-file={net}", *options)
         _strip_comments(net)
         with replacing(net_file) as temporary:
             temporary.write_bytes(net.read_bytes())

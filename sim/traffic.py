@@ -70,6 +70,6 @@ def vehicle_types_xml(accel_mps2: float, decel_mps2: float, ego_length_m: float)
     ]
     ego = (
         f'<vType id="ego" vClass="passenger" length="{ego_length_m}" width="1.8" accel="{accel_mps2}" decel="{decel_mps2 + 1.0}" '
-        f'sigma="0" speedDev="0" lcStrategic="10" lcSpeedGain="0" lcKeepRight="0" timeToTeleport="-1"/>'
+        f'sigma="0" speedDev="0" lcStrategic="10" lcSpeedGain="0" lcKeepRight="0" lcOpposite="0" timeToTeleport="-1"/>'
     )
     return "\n".join(["<additional>", *kinds, ego, "</additional>", ""])

@@ -16,6 +16,7 @@ from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.files.scenarios import PACKAGE, located
+from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import tour_graph
@@ -68,7 +69,7 @@ class Draft:
     notes: tuple[str, ...]  # what is odd about the network, with place and cure
 
 
-def new_scenario(name: str, source: str, path: Path) -> Draft:
+def new_scenario(name: str, source: str, path: Path, driving_side: Choice = "auto") -> Draft:
     """Write a scenario whose values suit a road network, and say what they are.
 
     Args:
@@ -76,6 +77,7 @@ def new_scenario(name: str, source: str, path: Path) -> Draft:
         source: A kind of town to be generated, one of ``KINDS``, or a map's file. A map that is no SUMO network is imported
             once: its network is written beside the scenario.
         path: The scenario's file.
+        driving_side: Where traffic keeps in a generated town or an imported map; ``auto``: as the map says, else right.
 
     Raises:
         HippodromeError: The source or the name cannot be used, or a file that would be written exists.
@@ -86,10 +88,10 @@ def new_scenario(name: str, source: str, path: Path) -> Draft:
             raise HippodromeError(f"{target}: exists already; choose another --out, or remove it first")
     with tempfile.TemporaryDirectory() as folder:
         imported = Path(folder) / network.name if network else None
-        imported_notes = import_map(Path(source), imported) if imported else ()
-        town = _town(source, imported, Path(folder))
+        imported_notes = import_map(Path(source), imported, driving_side) if imported else ()
+        town = _town(source, imported, Path(folder), driving_side)
         draft = draft_for(town)
-        text = scenario_text(name, source, path, draft)
+        text = scenario_text(name, source, path, draft, driving_side)
         trial = Path(folder) / path.name
         trial.write_text(text, encoding="utf-8")
         scenario = _checked(trial, path)
@@ -118,13 +120,13 @@ def draft_for(town: Town) -> Draft:
     )
 
 
-def scenario_text(name: str, source: str, path: Path, draft: Draft) -> str:
+def scenario_text(name: str, source: str, path: Path, draft: Draft, driving_side: Choice = "auto") -> str:
     """The text of the scenario's file, with comments."""
     return TEMPLATE.format(
         title=f"A generated town, {source}." if source in KINDS else f"The roads of {Path(source).name}.",
         file=path,
         name=_scalar(name),
-        town=_town_line(source, path),
+        town=_town_line(source, path, driving_side),
         rate_hz=draft.rate_hz,
         tour_m=draft.tour_m,
         tour_words=_tour_words(draft),
@@ -134,10 +136,10 @@ def scenario_text(name: str, source: str, path: Path, draft: Draft) -> str:
     )
 
 
-def _town_line(source: str, path: Path) -> str:
+def _town_line(source: str, path: Path, driving_side: Choice) -> str:
     """The line of the file that says where to drive."""
     if source in KINDS:
-        return f"town: {_flow(_shipped_town(source))}"
+        return f"town: {_flow(_shipped_town(source, driving_side))}"
     if _is_imported(source):
         return f"town: {{network: {_scalar(f'{path.stem}.net.xml.gz')}}}  # imported by netconvert; netedit opens it"
     return f"town: {{network: {_scalar(source if source.startswith(PACKAGE) else _relative(source, path))}}}"
@@ -153,29 +155,29 @@ def _is_imported(source: str) -> bool:
     return source not in KINDS and is_foreign(source)
 
 
-def _town(source: str, imported: Path | None, folder: Path) -> Town:
+def _town(source: str, imported: Path | None, folder: Path, driving_side: Choice) -> Town:
     """Build or read the town that the values have to suit, with ``folder`` for whatever has to be written.
 
     ``imported`` is the network made of a foreign map; errors about it name the map, which the user knows.
     """
     if source in KINDS:
-        return build_town(TownSpec.model_validate(_shipped_town(source)), 1, folder)
+        return build_town(TownSpec.model_validate(_shipped_town(source, driving_side)), 1, folder)
     network = imported or located(Path(source), "--from")
     if not network.is_file():
         raise HippodromeError(f"--from {source}: neither a kind of town ({', '.join(KINDS)}) nor a file")
-    if not network.name.endswith(KNOWN):
+    if not network.name.lower().endswith(KNOWN):
         raise HippodromeError(f"--from {source}: unknown kind of map; there are {', '.join(KNOWN)}")
     try:
-        return build_town(TownSpec(network=network.resolve()), 1, folder)
+        return build_town(TownSpec(network=network.resolve(), driving_side=driving_side), 1, folder)
     except HippodromeError as error:
         raise HippodromeError(str(error).replace(str(network), source)) from error
 
 
-def _shipped_town(kind: str) -> dict[str, object]:
+def _shipped_town(kind: str, driving_side: Choice) -> dict[str, object]:
     """The town of the scenario of this kind that comes with the package, so that sizes are chosen in one place."""
     text = (files("hippodrome.scenarios") / "towns" / f"{kind}.yaml").read_text(encoding="utf-8")
     town: dict[str, object] = yaml.safe_load(text)["town"]
-    return town
+    return town if driving_side == "auto" else {**town, "driving_side": driving_side}
 
 
 def _relative(source: str, path: Path) -> str:

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.sim.map_import import IMPORT
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.types import Town
 
@@ -17,15 +18,18 @@ CURES: Final = {  # what to do, by words in the notes of ``sim.network.check_net
     "cannot be left or reached again": "to tour them, import a larger extract, or draw the way back in netedit",
     "zero-length lane": "nothing to do; `netconvert --junctions.join` removes most",
     "coincide at": "if one can drive across, join them: `netconvert --junctions.join`, or netedit",
+    "have one lane for both directions": "nothing to do; for traffic there, give each direction a lane of its own in netedit",
+    "has no lanes inside junctions": "the lanes are then made, also where the file has connections without them",
     "wait for a hand": "nothing to do; a program of your own, drawn in netedit, is kept",
 }
+COMPLETE: Final = (IMPORT, "netconvert: ")  # notes on an import say themselves what to do
 # Greatest way between two frames: beyond it a view shows another place than the one before, for vertices are 5 m apart.
 VIEW_GAP_M: Final = 4.0
 
 
 def network_notes(scenario: Scenario, town: Town) -> tuple[str, ...]:
     """One line for each oddity of the network and of the drives in it, with place and cure."""
-    placed = [f"{_with_place(note, town.network)}: {_cure(note)}" for note in town.notes]
+    placed = [note if note.startswith(COMPLETE) else f"{_with_place(note, town.network)}: {_cure(note)}" for note in town.notes]
     return (*_few_of_a_kind(placed), *_rate_notes(scenario, town.network))
 
 
@@ -60,7 +64,7 @@ def _few_of_a_kind(notes: Sequence[str]) -> Iterator[str]:
     """At most ``SHOWN`` notes with the same cure, and how many more there are."""
     kinds: dict[str, list[str]] = {}
     for note in notes:
-        kinds.setdefault(_cure(note), []).append(note)
+        kinds.setdefault(note if note.startswith(COMPLETE) else _cure(note), []).append(note)
     for alike in kinds.values():
         yield from alike[:SHOWN]
         if len(alike) > SHOWN:

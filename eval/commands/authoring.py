@@ -36,6 +36,11 @@ def add_scenario_command(commands: Any) -> None:
         help="where to drive: a town to be generated (rural, grid, radial or random), or a map's file: SUMO (.net.xml, "
              ".net.xml.gz), OpenStreetMap (.osm, .osm.gz, .osm.pbf) or OpenDRIVE (.xodr)",
     )  # fmt: skip
+    new.add_argument(
+        "--driving-side", choices=("auto", "left", "right"), default="auto",
+        help="where traffic keeps in a generated town or a map that is imported (default: auto, as the map's roundabouts, tags, "
+             "rules or place say, else right; what is found is told in a note)",
+    )  # fmt: skip
     new.add_argument("--out", type=Path, metavar="FILE", help="file for the scenario (default: NAME.yaml)")
 
     validate = add_command(
@@ -73,7 +78,7 @@ def _new(options: argparse.Namespace) -> int:
     from hippodrome.eval.authoring.draft import new_scenario
 
     path = options.out or Path(f"{options.name}.yaml")
-    draft = new_scenario(options.name, options.source, path)
+    draft = new_scenario(options.name, options.source, path, options.driving_side)
     for note in draft.notes:
         print(f"note: {note}")
     print(f"{path}: written; {draft.drivable_km:.2f} km to drive, mapping tour {draft.tour_m:.0f} m\n"

@@ -11,7 +11,9 @@ from hippodrome.eval.authoring.draft import draft_for, new_scenario
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.sim import map_import
 from hippodrome.sim.map_import import import_map, sumo_network
+from hippodrome.sim.netconvert_notes import netconvert_notes
 from hippodrome.sim.network import read_network
+from hippodrome.sim.opendrive import with_arcs_for_arcs
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.town import TownSpec, build_town, read_town
 
@@ -174,11 +176,12 @@ OVAL = """<OpenDRIVE><header revMajor="1" revMinor="4"/><road name="oval" length
 </laneSection></lanes></road></OpenDRIVE>"""
 
 
+@pytest.mark.parametrize("quote", ['"', "'"])
 @pytest.mark.parametrize("end", ["0.05", "0.05000000000000001"])
-def test_a_spiral_that_is_an_arc_is_read_as_one(tmp_path, end):
+def test_a_spiral_that_is_an_arc_is_read_as_one(tmp_path, end, quote):
     """netconvert makes a straight of the one and runs out of memory on the other; the half circles have a radius of 20 m."""
     source = tmp_path / "oval.xodr"
-    source.write_text(OVAL.format(end=end))
+    source.write_text(OVAL.format(end=end).replace('"', quote))
     net_file, notes = sumo_network(source, tmp_path)
     points = read_network(net_file).points_m
     assert "2 spiral(s) of constant curvature" in notes[0]
@@ -188,4 +191,72 @@ def test_a_spiral_that_is_an_arc_is_read_as_one(tmp_path, end):
 def test_a_spiral_that_is_one_goes_to_netconvert_as_it_is(tmp_path):
     source = tmp_path / "map.xodr"
     source.write_text(OVAL.format(end="0.06"))
-    assert map_import._with_arcs_for_arcs(source) == 0 and source.read_text() == OVAL.format(end="0.06")
+    assert with_arcs_for_arcs(source) == 0 and source.read_text() == OVAL.format(end="0.06")
+
+
+def test_entities_are_refused(tmp_path):
+    lines = "".join(f"<!ENTITY a{i + 1} '{10 * f'&a{i};'}'>" for i in range(9))
+    source = tmp_path / "lol.osm"
+    source.write_text(f"<!DOCTYPE osm [<!ENTITY a0 'lol'>{lines}]><osm x='&a9;'>&a9;</osm>")
+    with pytest.raises(HippodromeError, match=r"lol\.osm: declares XML entities .*take the DOCTYPE out"):
+        import_map(source, tmp_path / "lol.net.xml.gz")
+
+
+def test_a_curve_that_netconvert_cannot_follow_finely_is_drawn_coarsely(tmp_path, monkeypatch):
+    def refuses_fine_curves(name, *options, input_bytes=0):
+        if any(option.startswith("--opendrive.curve-resolution") for option in options):
+            raise HippodromeError("netconvert failed (1): Error: std::bad_alloc")
+        run_tool(name, *options, input_bytes=input_bytes)
+
+    monkeypatch.setattr(map_import, "run_tool", refuses_fine_curves)
+    source = tmp_path / "oval.xodr"
+    source.write_text(OVAL.format(end="0.05"))
+    notes = import_map(source, tmp_path / "oval.net.xml.gz")
+    assert any("drew them more coarsely" in note for note in notes)
+    assert np.ptp(read_network(tmp_path / "oval.net.xml.gz").points_m, axis=0) == pytest.approx([163.5, 43.5], abs=1.0)
+
+
+def test_a_map_that_fails_twice_says_the_first_reason_and_a_cure(tmp_path):
+    source = tmp_path / "odd.xodr"
+    source.write_text(OVAL.format(end="0.05").replace('x="120" y="40"', 'x="1,5" y="40"'))
+    with pytest.raises(HippodromeError, match=r"odd\.xodr: cannot be imported: netconvert .*'x' in definition of .*correct this"):
+        import_map(source, tmp_path / "odd.net.xml.gz")
+
+
+def test_a_lane_without_a_number_is_said_of_the_users_file(tmp_path):
+    source = tmp_path / "odd.xodr"
+    source.write_text(OVAL.format(end="0.05").replace('<lane id="-1"', '<lane id="x"').replace("<road ", '<road rule="LHT" '))
+    with pytest.raises(HippodromeError, match=r"odd\.xodr: not a consistent OpenDRIVE file .*write it again with the tool"):
+        import_map(source, tmp_path / "odd.net.xml.gz")
+
+
+def test_warnings_have_place_meaning_and_cure(tmp_path):
+    made = tmp_path / "made.net.xml"
+    made.write_text(
+        '<net><lane id="a_0" index="0" shape="12.4,5.0 20,5"/><junction id="J" type="priority" x="7.0" y="8.6"/></net>'
+    )
+    log = [
+        "Warning: Speed of turning connection 'a_0->b_0' reduced by 3.2.",
+        "Warning: Speed of turning connection 'c_0->d_0' reduced by 4.2.",
+        "Warning: Could not compute spiral geometry for edge 'a'.",
+        "Warning: Something new about junction 'J'.",
+        "Loading done.",
+        *(f"Warning: Strange thing {'x' * i}" for i in range(4)),
+    ]
+    notes = netconvert_notes(log, made)
+    assert notes[0].startswith(
+        "netconvert: Could not compute spiral geometry for edge 'a' at (12, 5) m: a curve was drawn as a straight"
+    )
+    assert "reduced by 3.2 at (12, 5) m (2 of this kind): cars turn slowly there; nothing to do" in notes[1]
+    assert "about junction 'J' at (7, 9) m: look there in netedit" in notes[2]
+    assert len(notes) == 6 and notes[5].startswith("netconvert: 2 warnings of 2 more kinds")
+
+
+def test_a_comma_in_a_folder_and_capitals_in_a_name_do_no_harm(tmp_path):
+    folder = tmp_path / "a,b c"
+    folder.mkdir()
+    new_scenario("town", str(packed_block(folder, ".osm")), folder / "town.yaml")
+    assert check_scenario(folder / "town.yaml").errors == ()
+    (folder / "TOWN.NET.XML").write_bytes(gzip.decompress((folder / "town.net.xml.gz").read_bytes()))
+    new_scenario("again", str(folder / "TOWN.NET.XML"), folder / "again.yaml")
+    assert check_scenario(folder / "again.yaml").errors == ()

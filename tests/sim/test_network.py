@@ -8,15 +8,14 @@ import sumo
 import sumolib
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.sim.net_file import is_left_hand, load_net
+from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import (
-    check_network,
     drivable_edges,
     edge_lengths_m,
     edge_links,
-    is_left_hand,
     junction_gaps,
     junction_lengths_m,
-    load_net,
     read_network,
     road_network,
 )

@@ -86,10 +86,11 @@ def test_limits_on_a_row_that_is_never_written_are_noted(tmp_path):
 
 
 def test_notes_have_a_place_and_a_cure():
-    """On a real network that has every kind of oddity but one, and as many of the last as there are words for it."""
+    """On a real network that has most kinds of oddities, and with notes of the others."""
     town = read_town(Path(sumo.SUMO_HOME) / "tools" / "game" / "bs3d" / "bs.net.xml")
     coincident = tuple(f"nodes a{i} and b coincide at ({i}.0, 2.0) m but are not connected" for i in range(5))
-    notes = network_notes(Scenario(name="a"), SimpleNamespace(network=town.network, notes=(*town.notes, *coincident)))
+    others = "1 street(s) have one lane for both directions, for instance a and b", "a.net.xml has no lanes inside junctions"
+    notes = network_notes(Scenario(name="a"), SimpleNamespace(network=town.network, notes=(*town.notes, *coincident, *others)))
     for words, cure in CURES.items():
         assert any(words in note and note.endswith(cure) for note in notes), words
     assert any("61734682#1 at (1131, 827) m) cannot be left" in note for note in notes)

@@ -1,0 +1,86 @@
+"""What netconvert warns of, as notes: one for each kind of warning, with its place, what it means, and what to do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+MAX_NOTES: Final = 5  # kinds of warnings that are shown; the rest is counted
+SPIRALS: Final = "Could not compute spiral geometry"
+
+# Words of a warning, and what it means for a drive, with the cure where one is needed. The gravest kinds stand first.
+MEANINGS: Final[tuple[tuple[str, str], ...]] = (
+    (SPIRALS, "a curve was drawn as a straight; write it as arcs, or with a curvature that changes, and import the map again"),
+    ("is not known", "a road lacks points there and was cut; export the map with all nodes of its ways"),
+    ("nvalid", "this part of the map was left out or read otherwise; correct it in the map"),
+    ("not numeric", "the usual value for such a road was taken; correct the tag in the map if it matters"),
+    ("nable to parse", "the usual value was taken; correct it in the map if it matters"),
+    ("nknown", "it was left out; correct it in the map if it matters"),
+    ("urn restriction", "a ban on turning was not understood and cars may turn; correct the relation in the map"),
+    ("oneway", "the tag was not understood; look at the directions of this road in netedit"),
+    ("Could not", "this part of the map was left out; look there in netedit"),
+    ("ould not be", "this part of the map was left out; look there in netedit"),
+    ("is not connected", "no car can come to or leave this lane; draw a connection in netedit if there is one"),
+    ("ntersecting left turns", "turning cars wait for one another there; nothing to do"),
+    ("sharp turn", "cars slow down there; smooth the road in netedit if it is no such turn"),
+    ("Found angle", "cars slow down there; smooth the road in netedit if it is no such bend"),
+    ("Speed of", "cars turn slowly there; nothing to do"),
+    ("has to be split", "a road that ends where it begins became two; nothing to do"),
+    ("does not control any links", "the signal was left out; nothing to do"),
+    ("inor green", "turning cars give way there; nothing to do"),
+    ("Ambigu", "one of two ways to turn round was taken; nothing to do"),
+    ("joining junctions", "a crossing stays in several parts; join them in netedit if cars wait inside of it"),
+    ("unction cluster", "a crossing stays in several parts; join them in netedit if cars wait inside of it"),
+    ("distance", "a crossing is drawn aside of its place; look there in netedit"),
+    ("Discarding", "such roads are not for cars and were left out; nothing to do"),
+)
+UNKNOWN: Final = "look there in netedit"
+
+
+def netconvert_notes(log: Sequence[str], made: Path) -> tuple[str, ...]:
+    """The warnings of a run of netconvert.
+
+    Args:
+        log: The lines that it wrote.
+        made: The network that it made, by which named junctions and edges are given a place; it need not be there.
+
+    Returns:
+        One note for each kind of warning, the gravest first; after ``MAX_NOTES`` of them a count of the others.
+    """
+    kinds: dict[str, list[str]] = {}
+    for line in log:
+        if line.startswith("Warning: "):
+            text = line.removeprefix("Warning: ").strip()
+            kinds.setdefault(re.sub(r"'[^']*'|[-\d.]+", "#", text), []).append(text)
+    alike = sorted(kinds.values(), key=lambda same: _meaning(same[0])[0])
+    network = made.read_text(encoding="utf-8", errors="replace") if alike and made.is_file() else ""
+    notes = [_note(same, network) for same in alike[:MAX_NOTES]]
+    hidden = sum(len(same) for same in alike[MAX_NOTES:])
+    more = f"netconvert: {hidden} warnings of {len(alike) - MAX_NOTES} more kinds; run netconvert on the map to see them"
+    return (*notes, *([more] if hidden else []))
+
+
+def _note(same: Sequence[str], network: str) -> str:
+    """The note on warnings of one kind."""
+    text = same[0].rstrip(".")
+    count = f" ({len(same)} of this kind)" if len(same) > 1 else ""
+    return f"netconvert: {text}{_place(text, network)}{count}: {_meaning(text)[1]}"
+
+
+def _meaning(text: str) -> tuple[int, str]:
+    """How grave a warning is, 0 being the gravest, and what it means."""
+    found = ((rank, meaning) for rank, (words, meaning) in enumerate(MEANINGS) if words in text)
+    return next(found, (len(MEANINGS), UNKNOWN))
+
+
+def _place(text: str, network: str) -> str:
+    """Where the first junction or edge lies that a warning names, if the network has one of that name."""
+    for name in re.findall(r"'([^']+)'", text):
+        edge = re.escape(name.partition("->")[0])
+        junction = re.search(rf'<junction id="{re.escape(name)}"[^>]* x="([-\d.]+)" y="([-\d.]+)"', network)
+        lane = re.search(rf'<lane id="{edge}(?:_\d+)?"[^>]* shape="([-\d.]+),([-\d.]+)', network)
+        if found := junction or lane:
+            return f" at ({float(found[1]):.0f}, {float(found[2]):.0f}) m"
+    return ""

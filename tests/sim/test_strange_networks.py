@@ -1,0 +1,46 @@
+"""Networks of traits that strangers' maps have: each is driven to the end, or refused with a reason that is true."""
+
+import inspect
+
+import numpy as np
+import pytest
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.sim.drive import simulate_drive
+from hippodrome.sim.ego import EgoSpec
+from hippodrome.sim.tour import TourSpec
+from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.traffic import TrafficSpec
+from tests.sim import strange_networks
+
+BUILDERS = {
+    name: build
+    for name, build in inspect.getmembers(strange_networks, inspect.isfunction)
+    if build.__module__ == strange_networks.__name__ and next(iter(inspect.signature(build).parameters), "") == "folder"
+}
+DRIVEN = sorted(BUILDERS.keys() - {"converted", "osm", "never_green"})
+
+
+@pytest.mark.parametrize("name", DRIVEN)
+def test_a_drive_is_as_long_as_asked(tmp_path, name):
+    town = build_town(TownSpec(network=BUILDERS[name](tmp_path)), 1, tmp_path)
+    assert town.left_hand == (name == "roundabout_left")
+    for seed in (1, 2):
+        drive = simulate_drive(town, TourSpec(length_m=250), TrafficSpec(vehicles=8), EgoSpec(), seed)
+        driven_m = np.linalg.norm(np.diff(drive.poses_m[:, :2], axis=0), axis=1).sum()
+        assert driven_m == pytest.approx(250, abs=20)  # the bicycle cuts and widens corners
+        assert np.abs(np.diff(drive.speed_mps)).max() < 0.5 * 1.01  # no jump: 8 m/s^2 at most, of steps of 0.05 s
+
+
+def test_a_light_without_green_is_named(tmp_path):
+    town = build_town(TownSpec(network=strange_networks.never_green(tmp_path)), 1, tmp_path)
+    with pytest.raises(
+        HippodromeError, match=r"standing for 360 s: the traffic light \w at the end of edge \w\w shows it no green"
+    ):
+        simulate_drive(town, TourSpec(length_m=250), TrafficSpec(vehicles=8), EgoSpec(), 1)
+
+
+def test_what_the_ferry_was_is_said(tmp_path):
+    notes = " | ".join(build_town(TownSpec(network=strange_networks.ferry(tmp_path)), 1, tmp_path).notes)
+    assert "route.ferry" in notes and "not for cars and were left out" in notes
+    assert "cannot be left or reached again" in notes

@@ -214,7 +214,7 @@ def _seen_motion(options: ImportOptions, drive: ForeignDrive, calibration: Calib
     undistort = undistorter(calibration, own_px) if calibration else (lambda frame: frame)
     seen = visual_motion(drive.frames, RoadCamera(matrix, options.camera_height_m), own_px, undistort)
     print(f"warning: self-motion from the frames alone supposes a camera {options.camera_height_m:g} m above a flat road: "
-          "speeds are as wrong as that height (--camera-height), and wheels and a gyroscope are better if there are any")  # fmt: skip
+          "speeds are as wrong as that height (--camera-height); wheels and a gyroscope are better if there are any")  # fmt: skip
     for note in seen.notes:
         print(f"note: {note}")
     return seen.motion, "visual odometry of the frames"

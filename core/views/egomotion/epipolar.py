@@ -80,6 +80,11 @@ def estimate_rotation(before: FloatArray, after: FloatArray, pixel: float, prior
     return Turned(turned, vector, direction / np.linalg.norm(direction), tangents, told, inlier)
 
 
+def errors(before: FloatArray, after: FloatArray, turned: Turned) -> FloatArray:
+    """Sampson's error (N,) of corners, bearings (N, 3), under a motion; in bearings."""
+    return _error(before, after, turned.rotation, turned.tangents)[0]
+
+
 def _error(before: FloatArray, after: FloatArray, rotation: FloatArray, tangents: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Sampson's error (N,) and its slopes (N, 5) along a further rotation (3) and the tangents of the direction (2)."""
     way = np.array([tangents[0], tangents[1], 1.0])

@@ -1,8 +1,8 @@
 """Self-motion from the frames of any camera that looks ahead from a vehicle.
 
-Each frame is compared with a reference: the frame before, or an older one as long as the picture has hardly moved since. So a vehicle
-that stands does not drift, and one that creeps is not taken to stand. What is told of a frame is the motion since the reference,
-less what was told of it already.
+Each frame is compared with a reference: the frame before, or an older one as long as the picture has hardly moved since. So a
+vehicle that stands does not drift, and one that creeps is not taken to stand. What is told of a frame is the motion since the
+reference, less what was told of it already.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ class RoadOdometry:
         self._static = static
         self._matrix = camera.matrix
         self._reference: Reference | None = None
-        self._since_s, self._told = 0.0, np.zeros(2)  # time since the reference, and motion (m, rad) told since
+        self._since_s, self._told = 0.0, np.zeros(2)  # time since the reference, and motion (m, rad) seen since
+        self._blind_s, self._guessed = 0.0, np.zeros(2)  # time since the last frame, and motion told without any
         self._speed, self._yaw_rate_radps = speed.start(), 0.0
         self._heading, self._heading_pairs = camera.heading.copy(), np.zeros(2)
         self._patch: road.Patch | None = None
@@ -76,18 +77,20 @@ class RoadOdometry:
         """
         dt_s = observation.dt_s
         self._since_s += dt_s
+        self._blind_s += dt_s
         if observation.frame is None:
             step = self._rates() * dt_s
-            self._told = self._told + step
+            self._guessed = self._guessed + step
         else:
-            step = self._seen(working_image(observation.frame), observation.frame.shape[1], dt_s)
+            seen = self._seen(working_image(observation.frame), observation.frame.shape[1], self._blind_s)
+            step, self._blind_s, self._guessed = seen - self._guessed, 0.0, np.zeros(2)
         return replace(observation, speed=float(step[0]) / dt_s, yaw_rate_radps=float(step[1]) / dt_s)
 
     def _rates(self) -> FloatArray:
         return np.array([self._speed.mps, self._yaw_rate_radps])
 
     def _seen(self, image: Grey, width_px: int, dt_s: float) -> FloatArray:
-        """Motion (m, rad) that a frame tells beyond what has been told."""
+        """Motion (m, rad) since the frame before, ``dt_s`` ago."""
         reference = self._reference
         if reference is None or reference.image.shape != image.shape:
             self._matrix = working_matrix(self._camera.matrix, width_px)

@@ -93,8 +93,8 @@ def likelihood(agreement: FloatArray, standing: FloatArray, weights: FloatArray)
     """Log likelihood (K,) of the steps from how well each cell agrees after them (K, C).
 
     A cell with Gaussian texture of ``INDEPENDENT`` samples tells -n/2 ln(1 - r^2). One that fits no step at all, a wall or
-    another vehicle, is allowed to: no cell says more than ``OUTLIER_NATS`` against a step. Nor does it say anything against a step
-    after which it agrees no worse than if it had not moved at all, as the bonnet and what it mirrors do.
+    another vehicle, is allowed to: no cell says more than ``OUTLIER_NATS`` against a step. Nor does it say anything against a
+    step after which it agrees no worse than if it had not moved at all, as the bonnet and what it mirrors do.
 
     Args:
         agreement: Of each cell after each step, (K, C).

@@ -21,7 +21,7 @@ from hippodrome.eval.exchange.drives.plausible import require_plausible
 from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.drives.steps import begin_s, frames_within, steps_of
 from hippodrome.eval.exchange.drives.truth import Truth, read_truth, require_overlap, truth_of_trajectory, write_truth
-from hippodrome.eval.exchange.drives.visual import pinhole, visual_motion
+from hippodrome.eval.exchange.drives.visual import pinhole, seen_focal_px, visual_motion
 from hippodrome.eval.exchange.extra import optional_module
 from hippodrome.eval.exchange.readers.calibration import read_calibration
 from hippodrome.eval.exchange.readers.layouts import recognised
@@ -208,9 +208,17 @@ def _seen_motion(options: ImportOptions, drive: ForeignDrive, calibration: Calib
     own_px = _size_of(drive)
     if own_px is None:
         raise ExchangeError(f"{options.source}: no frames to estimate self-motion from; give --odometry FILE.csv or FILE.tum")
-    matrix = pinhole(drive.focal_px, calibration, own_px)
-    if matrix is None or field_of_view_deg(float(matrix[0, 0]), own_px[0]) is None:
-        raise ExchangeError(f"{options.source}: --odometry visual needs the camera's focal length; give --calibration FILE")
+    known_px = drive.focal_px if drive.focal_px or calibration else seen_focal_px(drive.frames)
+    matrix = pinhole(known_px, calibration, own_px)
+    fov_deg = None if matrix is None else field_of_view_deg(float(matrix[0, 0]), own_px[0])
+    if matrix is None or fov_deg is None:
+        raise ExchangeError(
+            f"{options.source}: --odometry visual needs the camera's focal length, which too few turns of the drive show; "
+            "give --calibration FILE"
+        )
+    if calibration is None and not drive.focal_px:
+        print(f"warning: focal length {matrix[0, 0]:.0f} pixels (field of view {fov_deg:.0f} degrees) by what the frames show in "
+              "turns, within some 10 %: turns and speeds are as wrong as that; give --calibration FILE if you can")  # fmt: skip
     undistort = undistorter(calibration, own_px) if calibration else (lambda frame: frame)
     seen = visual_motion(drive.frames, RoadCamera(matrix, options.camera_height_m), own_px, undistort)
     print(f"warning: self-motion from the frames alone supposes a camera {options.camera_height_m:g} m above a flat road: "

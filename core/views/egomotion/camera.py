@@ -22,7 +22,8 @@ class RoadCamera:
     height_m: float  # above the road; it gives the distances their unit
     forward_m: float = 1.6  # ahead of the rear axle
     heading: FloatArray = field(default_factory=lambda: np.zeros(2))  # (2,) tangents, right and down, of where it is driven to
-    heading_sigma: float = 0.1  # standard deviation of each: 6 degrees, a camera that was put up by hand
+    heading_sigma: float = 0.1  # standard deviation of each at first: 6 degrees, a camera that was put up by hand
+    heading_pairs: float = 0.0  # pairs of frames that it is known from
 
 
 def working_scale(width_px: int) -> float:

@@ -44,6 +44,7 @@ class Turned:
     direction: FloatArray  # (3,) unit vector to the second camera
     tangents: FloatArray  # (2,) rightwards and downwards, of the direction
     told: FloatArray  # (2,) share of each tangent that the corners told rather than the prior, 0 to 1
+    level: float  # tangent downwards of the direction if the camera had not pitched at all, to first order
     inlier: Bools  # (N,) corners that agree
 
 
@@ -75,9 +76,11 @@ def estimate_rotation(before: FloatArray, after: FloatArray, pixel: float, prior
     turned = _matrix(vector)
     error, _ = _error(before, after, turned, tangents)
     direction = np.array([tangents[0], tangents[1], 1.0])
-    told = np.clip(1.0 - np.diag(np.linalg.inv(information))[3:] / sigmas[3:] ** 2, 0.0, 1.0)
+    covariance = np.linalg.inv(information)
+    told = np.clip(1.0 - np.diag(covariance)[3:] / sigmas[3:] ** 2, 0.0, 1.0)
+    level = float(tangents[1] - covariance[4, 0] / covariance[0, 0] * vector[0])
     inlier = np.abs(error) < INLIER_PX * pixel
-    return Turned(turned, vector, direction / np.linalg.norm(direction), tangents, told, inlier)
+    return Turned(turned, vector, direction / np.linalg.norm(direction), tangents, told, level, inlier)
 
 
 def errors(before: FloatArray, after: FloatArray, turned: Turned) -> FloatArray:

@@ -1,7 +1,7 @@
 """The focal length of a camera that nobody calibrated, from frames between which it turned.
 
-When a camera turns, what it sees moves faster towards the edges of the picture, and the more so the wider its field of view. Of the
-fields of view tried the one is taken under which the corners of many pairs of frames fit a motion best.
+When a camera turns, what it sees moves faster towards the edges of the picture, and the more so the wider its field of view. Of
+the fields of view tried the one is taken under which the corners of many pairs of frames fit a motion best.
 """
 
 from __future__ import annotations

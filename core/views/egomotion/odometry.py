@@ -26,6 +26,7 @@ LEAST_LEFT: Final = 0.5  # .. nor with one of which fewer corners than this shar
 LEAST_CORNERS: Final = 15  # with fewer corners the last motion goes on
 LEAST_STEP_M: Final = 0.05  # a shorter step tells no depths ..
 HEADING_STEP_M, HEADING_CORNERS = 0.15, 40  # .. and what tells where the vehicle drives to: a step, and corners that agree
+LEAST_TOLD: Final = 0.2  # share of it that the corners told rather than what was believed before; that share is its weight
 HEADING_MEMORY: Final = 400.0  # pairs of frames over which that is averaged
 KNOWN_PAIRS: Final = 60.0  # pairs of frames from which on it is known well
 HEADING_PLAY: Final = 5e-4  # tangent by which the horizon has to move before the road is looked for anew
@@ -54,15 +55,15 @@ class RoadOdometry:
         self._since_s, self._told = 0.0, np.zeros(2)  # time since the reference, and motion (m, rad) seen since
         self._blind_s, self._guessed = 0.0, np.zeros(2)  # time since the last frame, and motion told without any
         self._speed, self._yaw_rate_radps = speed.start(), 0.0
-        self._heading, self._heading_pairs = camera.heading.copy(), np.zeros(2)
+        self._heading, self._heading_pairs = camera.heading.copy(), np.full(2, camera.heading_pairs)
         self._patch: road.Patch | None = None
         self._patch_heading = np.full(2, np.inf)
         self._pairs = 0
 
     def learned(self) -> tuple[RoadCamera, StaticMap | None]:
         """What the frames have shown of the camera so far: where it is driven to (the horizon), and what moves along with it."""
-        sigma = self._camera.heading_sigma / math.sqrt(1.0 + 4.0 * float(self._heading_pairs.min()))
-        return replace(self._camera, heading=self._heading.copy(), heading_sigma=sigma), self._static
+        known = replace(self._camera, heading=self._heading.copy(), heading_pairs=float(self._heading_pairs.min()))
+        return known, self._static
 
     @property
     def knows_camera(self) -> bool:
@@ -228,5 +229,6 @@ class RoadOdometry:
         if moved_m < HEADING_STEP_M or np.count_nonzero(turned.inlier) < HEADING_CORNERS:
             return
         self._heading_pairs = np.minimum(self._heading_pairs + turned.told, HEADING_MEMORY)
-        ahead = turned.tangents - np.array([prior.swing * turned.vector_rad[1], 0.0])
-        self._heading = self._heading + turned.told / np.maximum(self._heading_pairs + 0.5, 1.0) * (ahead - self._heading)
+        ahead = np.array([turned.tangents[0] - prior.swing * turned.vector_rad[1], turned.level])
+        weight = np.where(turned.told > LEAST_TOLD, 2.0, 0.0) / np.maximum(self._heading_pairs + 1.0, 2.0)  # later ones more
+        self._heading = self._heading + weight * (ahead - self._heading)

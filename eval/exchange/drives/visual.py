@@ -10,7 +10,8 @@ from typing import Final
 import numpy as np
 
 from hippodrome.core.types import FloatArray, Frame, Observation
-from hippodrome.core.views.egomotion.camera import RoadCamera
+from hippodrome.core.views.egomotion.camera import RoadCamera, working_image, working_scale
+from hippodrome.core.views.egomotion.focal import corner_pair, focal_px
 from hippodrome.core.views.egomotion.odometry import RoadOdometry
 from hippodrome.core.views.egomotion.static import StaticMap
 from hippodrome.eval.exchange.drives.calibration import Calibration
@@ -19,6 +20,7 @@ from hippodrome.eval.exchange.drives.foreign import ForeignFrame, Motion, requir
 from hippodrome.eval.exchange.drives.images import decode
 
 LEARNING_FRAMES: Final = 600  # frames that are looked at twice at most, to know the camera before the first of them counts
+FOCAL_PAIRS: Final = 300  # pairs of frames, all over the drive, that are looked at for the focal length
 STANDING_MPS: Final = 0.1  # a slower vehicle stands
 
 
@@ -30,13 +32,30 @@ class SeenMotion:
     notes: tuple[str, ...]  # lines to print
 
 
-def pinhole(focal_px: float | None, calibration: Calibration | None, size_px: tuple[int, int]) -> FloatArray | None:
+def pinhole(focal: float | None, calibration: Calibration | None, size_px: tuple[int, int]) -> FloatArray | None:
     """The matrix (3, 3) of a camera with frames of this size: as calibrated, else of its focal length; None without either."""
     if calibration is not None:
         return calibration.matrix
-    if not focal_px or focal_px <= 0.0:
+    if not focal or focal <= 0.0:
         return None
-    return np.array([[focal_px, 0.0, 0.5 * (size_px[0] - 1)], [0.0, focal_px, 0.5 * (size_px[1] - 1)], [0.0, 0.0, 1.0]])
+    return np.array([[focal, 0.0, 0.5 * (size_px[0] - 1)], [0.0, focal, 0.5 * (size_px[1] - 1)], [0.0, 0.0, 1.0]])
+
+
+def seen_focal_px(frames: Sequence[ForeignFrame]) -> float | None:
+    """The focal length that frames show between which the camera turns, in pixels of the frames; None if they do not tell it.
+
+    Raises ExchangeError if a frame cannot be read.
+    """
+    pairs = []
+    scale, size_px = 1.0, (0, 0)
+    for number in np.unique(np.linspace(0, len(frames) - 2, FOCAL_PAIRS).astype(int)) if len(frames) > 1 else ():
+        images = [decode(frame) for frame in frames[number : number + 2]]
+        before, after = (working_image(image) for image in images)
+        if before.shape == after.shape:
+            pairs.append(corner_pair(before, after))
+            scale, size_px = working_scale(images[0].shape[1]), (before.shape[1], before.shape[0])
+    found = focal_px(pairs, size_px)
+    return None if found is None else found / scale
 
 
 def visual_motion(

@@ -230,5 +230,5 @@ class RoadOdometry:
             return
         self._heading_pairs = np.minimum(self._heading_pairs + turned.told, HEADING_MEMORY)
         ahead = np.array([turned.tangents[0] - prior.swing * turned.vector_rad[1], turned.level])
-        weight = np.where(turned.told > LEAST_TOLD, 2.0, 0.0) / np.maximum(self._heading_pairs + 1.0, 2.0)  # later ones more
+        weight = np.where(turned.told > LEAST_TOLD, 1.0, 0.0) / np.maximum(self._heading_pairs + 0.5, 1.0)
         self._heading = self._heading + weight * (ahead - self._heading)

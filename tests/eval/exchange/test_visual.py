@@ -29,7 +29,8 @@ def archive():
 @pytest.fixture(scope="module")
 def truth():
     """Steps (N,) and turns to the left (N,) of the camera."""
-    rows = np.loadtxt(gzip.open(DRIVE / "03.txt.gz")).reshape(-1, 3, 4)
+    text = gzip.decompress((DRIVE / "03.txt.gz").read_bytes()).decode()
+    rows = np.loadtxt(text.splitlines()).reshape(-1, 3, 4)
     ahead = np.unwrap(np.arctan2(-rows[:, 0, 2], rows[:, 2, 2]))
     return np.linalg.norm(np.diff(rows[:, :, 3], axis=0), axis=1), np.diff(ahead)
 

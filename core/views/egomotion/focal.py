@@ -15,7 +15,6 @@ import numpy as np
 from hippodrome.core.types import FloatArray
 from hippodrome.core.views.egomotion import epipolar
 from hippodrome.core.views.egomotion.tracks import Grey, follow, new_corners
-from hippodrome.core.views.peaks import peak_of_values
 
 FIELDS_DEG: Final = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0, 110.0, 120.0)  # fields of view tried
 USUAL_DEG: Final = 65.0  # under which the pairs that turn most are picked
@@ -46,9 +45,8 @@ def focal_px(pairs: Sequence[Corners], size_px: tuple[int, int]) -> float | None
     best = int(np.argmin(cost))
     if not 0 < best < len(cost) - 1 or min(cost[0], cost[-1]) < cost[best] + CLEAR_NATS:
         return None
-    near = np.array(FIELDS_DEG[best - 1 : best + 2]) - FIELDS_DEG[best]
-    offset = peak_of_values(near[0], -cost[best - 1], -cost[best], near[2], -cost[best + 1])
-    return _focal_of(FIELDS_DEG[best] + offset, size_px)
+    least = np.polynomial.Polynomial.fit(FIELDS_DEG[best - 1 : best + 2], cost[best - 1 : best + 2], 2).deriv().roots()[0]
+    return _focal_of(float(least), size_px)
 
 
 def _focal_of(field_deg: float, size_px: tuple[int, int]) -> float:

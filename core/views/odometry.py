@@ -1,5 +1,8 @@
 """Visual odometry: self-motion from the frames alone, for a level camera of known height on a vehicle that does not skid.
 
+What follows is for a camera that sees the road right ahead of the vehicle, as the simulator's does; all others are left
+to the room ``egomotion``.
+
 The turn comes from tracked corners. A vehicle moves along circular arcs, so that one parameter, the turn, determines the epipolar
 geometry of two frames (Scaramuzza 2011, "1-point-RANSAC structure from motion for vehicle-mounted cameras"); the turn of the
 least epipolar error is found by trying.
@@ -20,6 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hippodrome.core.types import Float32Array, FloatArray, Frame, Observation
+from hippodrome.core.views.egomotion.camera import RoadCamera
+from hippodrome.core.views.egomotion.odometry import RoadOdometry
 from hippodrome.core.views.peaks import peak_in_row
 
 Grey: TypeAlias = NDArray[Any]  # (H, W) uint8
@@ -48,6 +53,7 @@ LARGEST_CHANGE_M = 0.4  # largest change of the step: full braking, 10 m/s^2 at 
 LEAST_STEP_M = 0.25  # a shorter step shows mostly how well the image agrees with itself
 LEAST_CORRELATION = 0.35  # a worse agreement is chance
 FIRST_STEP_M = 1.0  # expected before the first step is known
+LEVEL_SIGMA = 0.01  # tangent by which a camera that is said to look straight ahead and level does not
 
 
 @dataclass(frozen=True)
@@ -64,12 +70,27 @@ class CameraGeometry:
         if not 0.0 < self.fov_deg < 180.0 or self.height_m <= 0.0:
             raise ValueError(f"camera: fov_deg must lie in (0, 180), height_m be positive, got {self.fov_deg}, {self.height_m}")
 
+    def focal_px(self, width_px: int) -> float:
+        """Focal length in pixels of frames of this width."""
+        return 0.5 * width_px / math.tan(0.5 * math.radians(self.fov_deg))
+
+    def sees_road_ahead(self, width_px: int, height_px: int) -> bool:
+        """Whether frames of this size show the road from ``NEAR_M`` on."""
+        return self.focal_px(width_px) * self.height_m / NEAR_M <= 0.5 * (height_px - 1)
+
+    def on_road(self, width_px: int, height_px: int) -> RoadCamera:
+        """The camera, with frames of this size, as the room ``egomotion`` takes it. It is known to be mounted straight."""
+        focal_px = self.focal_px(width_px)
+        matrix = np.array([[focal_px, 0.0, 0.5 * (width_px - 1)], [0.0, focal_px, 0.5 * (height_px - 1)], [0.0, 0.0, 1.0]])
+        return RoadCamera(matrix, self.height_m, self.forward_m, heading_sigma=LEVEL_SIGMA)
+
 
 class VisualOdometry:
     """Takes observations in order; each comes back with the speed (m/s) and yaw rate that the frames show in place of its own."""
 
     def __init__(self, camera: CameraGeometry) -> None:
         self._camera = camera
+        self._elsewhere: RoadOdometry | None = None  # takes over where the frames do not show the road right ahead
         self._last: Grey | None = None  # the last frame
         self._step_m, self._turned_rad = FIRST_STEP_M, 0.0  # motion between the last two frames
         self._since_frame_s, self._reported = 0.0, np.zeros(2)  # time since the last frame, and motion (m, rad) reported in it
@@ -81,6 +102,12 @@ class VisualOdometry:
         Without a frame the motion goes on at the last rates. With one, the true motion since the frame before is known, and this
         observation reports what of it has not been reported yet (which may be negative).
         """
+        if self._last is None and self._elsewhere is None and observation.frame is not None:
+            size_px = observation.frame.shape[1], observation.frame.shape[0]
+            if not self._camera.sees_road_ahead(*size_px):
+                self._elsewhere = RoadOdometry(self._camera.on_road(*size_px))
+        if self._elsewhere is not None:
+            return self._elsewhere.step(observation)
         self._since_frame_s += observation.dt_s
         step = self._rates * observation.dt_s
         if observation.frame is not None:
@@ -95,7 +122,7 @@ class VisualOdometry:
 
     def _motion_between(self, before: Grey, after: Grey) -> tuple[float, float]:
         """Distance (m) and turn to the left (rad) between two frames."""
-        focal_px = 0.5 * after.shape[1] / math.tan(0.5 * math.radians(self._camera.fov_deg))
+        focal_px = self._camera.focal_px(after.shape[1])
         corners_before, corners_after = track_corners(before, after)
         if len(corners_before) >= LEAST_CORNERS:
             if float(np.median(np.hypot(*(corners_after - corners_before).T))) < STILL_PX:

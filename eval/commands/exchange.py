@@ -80,7 +80,7 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
         "--odometry", metavar="FILE",
         help="the self-motion: a .csv with columns for time, speed and yaw rate (any unit of length a second; radians a second), "
              "a file of poses (TUM's or KITTI's), the word 'truth' to differentiate the true poses, or the word 'visual' to "
-             "estimate it from the frames, roughly (default: what the layout has)",
+             "estimate it from the frames of a camera that looks ahead (default: what the layout has)",
     )  # fmt: skip
     into.add_argument(
         "--time-unit",
@@ -105,7 +105,7 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     into.add_argument(
         "--camera-height", type=_rate, default=1.5, metavar="M", dest="camera_height_m",
-        help="height of the camera above the road in metres, for --odometry visual (default: 1.5)",
+        help="metres of the camera above the road, for --odometry visual: its speeds are as wrong as this (default: 1.5)",
     )  # fmt: skip
     into.add_argument(
         "--camera-ahead", type=_ahead, default="auto", metavar="N",

@@ -9,7 +9,7 @@ from typing import Any, Final, Literal, TypeAlias
 import numpy as np
 
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.egomotion.camera import RoadCamera
 from hippodrome.eval.exchange.drives.calibration import Calibration, scaled, undistorter
 from hippodrome.eval.exchange.drives.clock import TimeUnit
 from hippodrome.eval.exchange.drives.errors import ExchangeError
@@ -29,7 +29,7 @@ from hippodrome.eval.exchange.drives.plausible import require_plausible
 from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.drives.steps import begin_s, frames_within, steps_of
 from hippodrome.eval.exchange.drives.truth import Truth, read_truth, require_overlap, truth_of_trajectory, write_truth
-from hippodrome.eval.exchange.drives.visual import visual_motion
+from hippodrome.eval.exchange.drives.visual import pinhole, seen_focal_px, visual_motion
 from hippodrome.eval.exchange.extra import optional_module
 from hippodrome.eval.exchange.readers.calibration import read_calibration
 from hippodrome.eval.exchange.readers.layouts import recognised
@@ -246,16 +246,25 @@ def _offset_s(
 
 
 def _seen_motion(options: ImportOptions, drive: ForeignDrive, calibration: Calibration | None) -> tuple[Motion, str]:
-    """Self-motion by visual odometry, with a warning of what it cannot do. Raises ExchangeError without a focal length."""
+    """Self-motion by visual odometry, with a note of what it takes for granted. Raises ExchangeError without a focal length."""
     own_px = _size_of(drive)
     if own_px is None:
         raise ExchangeError(f"{options.source}: no frames to estimate self-motion from; give --odometry FILE.csv or FILE.tum")
-    fov_deg = field_of_view_deg(drive.focal_px if calibration is None else float(calibration.matrix[0, 0]), own_px[0])
-    if fov_deg is None:
-        raise ExchangeError(f"{options.source}: --odometry visual needs the camera's focal length; give --calibration FILE")
-    print(f"warning: self-motion from the frames alone supposes a level camera {options.camera_height_m:g} m above a flat road "
-          f"that it sees from 2.4 m on (field of view {fov_deg:.0f} degrees taken); turns and speeds of other cameras come out "
-          "too small: prefer wheels and a gyroscope")  # fmt: skip
+    known_px = drive.focal_px if drive.focal_px or calibration else seen_focal_px(drive.frames)
+    matrix = pinhole(known_px, calibration, own_px)
+    fov_deg = None if matrix is None else field_of_view_deg(float(matrix[0, 0]), own_px[0])
+    if matrix is None or fov_deg is None:
+        raise ExchangeError(
+            f"{options.source}: --odometry visual needs the camera's focal length, which too few turns of the drive show; "
+            "give --calibration FILE"
+        )
+    if calibration is None and not drive.focal_px:
+        print(f"warning: focal length {matrix[0, 0]:.0f} pixels (field of view {fov_deg:.0f} degrees) by what the frames show in "
+              "turns, within some 10 %: turns and speeds are as wrong as that; give --calibration FILE if you can")  # fmt: skip
     undistort = undistorter(calibration, own_px) if calibration else (lambda frame: frame)
-    geometry = CameraGeometry(fov_deg=fov_deg, height_m=options.camera_height_m)
-    return visual_motion(drive.frames, geometry, own_px, undistort), "visual odometry of the frames"
+    seen = visual_motion(drive.frames, RoadCamera(matrix, options.camera_height_m), own_px, undistort)
+    print(f"warning: self-motion from the frames alone supposes a camera {options.camera_height_m:g} m above a flat road: "
+          "speeds are as wrong as that height (--camera-height); wheels and a gyroscope are better if there are any")  # fmt: skip
+    for note in seen.notes:
+        print(f"note: {note}")
+    return seen.motion, "visual odometry of the frames"

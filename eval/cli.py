@@ -1,4 +1,4 @@
-"""The command line. Exit status: 0 done, 1 a threshold failed, 2 bad input, 130 interrupted."""
+"""The command line. Exit status: 0 done, 1 a threshold failed, 2 bad input, 3 the gate cannot tell, 130 interrupted."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ examples:
   hippodrome refine out/grid/semi.pbstream --network out/grid/towns/*.net.xml --out out/grid/topo.pbstream
   hippodrome localize out/grid/topo.pbstream out/grid/recordings/grid-localization-* --out out/grid/drive.tum
 
-exit status: 0 done, 1 a threshold or a cell failed, 2 bad input (nothing is overwritten), 130 interrupted (rerun to resume)
+exit status: 0 done, 1 a threshold or a cell failed, 2 bad input (nothing is overwritten), 3 the gate cannot tell,
+             130 interrupted (rerun to resume)
 """
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -49,6 +50,30 @@ def write_atomically(path: Path, data: bytes) -> None:
             temporary.write_bytes(data)
     except OSError as error:
         raise HippodromeError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def read_bounded(path: Path, most_bytes: int) -> bytes:
+    """The bytes of a file that somebody names. No more than ``most_bytes`` are read, whatever the file says of its size.
+
+    Raises:
+        OSError: It cannot be read, is larger, or is no regular file: a device never ends, and a named pipe waits for a writer.
+        HippodromeError: It has a name that no file can have.
+    """
+    try:
+        with open(path, "rb", opener=_open_without_waiting) as stream:
+            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                raise OSError("not a regular file")
+            data: bytes = stream.read(most_bytes + 1)
+    except ValueError as error:  # a null byte in the name
+        raise HippodromeError(f"{str(path)!r}: not the name of a file: {error}") from error
+    if len(data) > most_bytes:
+        raise OSError(f"more than {most_bytes} bytes, the limit")
+    return data
+
+
+def _open_without_waiting(name: str, flags: int) -> int:
+    """Open a file; a named pipe would block until somebody writes to it."""
+    return os.open(name, flags | os.O_NONBLOCK)
 
 
 def sha256_of(path: Path) -> str:

@@ -1,9 +1,8 @@
 """The arithmetic of the gate's test: is the mean of a few log-ratios above zero, and how many more would tell?
 
 The same code gives the same bytes, so a difference is a difference; there is no noise of measurement to allow for. What is
-uncertain is whether a change that moves every pair a little is worse on towns and seeds in general, or only shuffles its luck among
-the pairs.
-Two observations speak for harm, and either suffices:
+uncertain is whether a change that moves every pair a little is worse on towns and seeds in general, or only shuffles its luck
+among the pairs. Two observations speak for harm, and either suffices:
 
 * the pairs agree: their mean is large beside their own spread (Student's t-test, powerful when harm is even);
 * the mean is large beside what a harmless change does to a pair (the same test with a spread that is assumed beforehand and gives
@@ -26,8 +25,8 @@ from hippodrome.core.types import FloatArray
 ALPHA: Final = 0.025  # chance to fail a build for a change that only shuffles, over all its figures together: one in forty
 REPEATABILITY: Final = 0.005  # least standard deviation of a pair's log-ratio: other processors and drivers round differently
 # What a change that is neither good nor bad does to a pair, as a standard deviation of its log-ratio, and how many pairs' worth
-# of weight that assumption has. ``hippodrome gate --study`` shows what follows: with these, changes by up to a quarter a pair, up or
-# down by the toss of a coin, fail at most one build in twenty.
+# of weight that assumption has. ``hippodrome gate --study`` shows what follows: with these, changes by up to a quarter a pair, up
+# or down by the toss of a coin, fail at most one build in twenty.
 HARMLESS_SPREAD: Final = 0.12
 HARMLESS_PAIRS: Final = 10
 MIN_PAIRS: Final = 3  # fewer have no spread worth the name

@@ -5,12 +5,12 @@ from __future__ import annotations
 import gzip
 import hashlib
 import re
-import tempfile
 import zlib
 from pathlib import Path
 from typing import Final
 
 from hippodrome._files import replacing, sha256_of, write_atomically
+from hippodrome._folders import temporary_folder
 from hippodrome.core.types import HippodromeError
 from hippodrome.sim.sumo_tools import run_tool
 
@@ -98,9 +98,9 @@ def import_map(source: Path, net_file: Path) -> tuple[str, ...]:
         raise HippodromeError(f"{source}: no such file")
     if source.stat().st_size > MAX_UNPACKED_BYTES:
         raise _too_large(source)
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         ending = ".osm" if source.name.lower().endswith(OSM) else ".xodr"
-        plain, made = Path(folder) / f"map{ending}", Path(folder) / "made.net.xml"
+        plain, made = folder / f"map{ending}", folder / "made.net.xml"
         _unpack(source, plain)
         notes = _convert(source, plain, made)
         with replacing(net_file) as temporary:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -30,12 +30,14 @@ from hippodrome.sim.recording import (
     write_arrays,
     write_chunk,
 )
-from hippodrome.sim.render.renderer import FrameRenderer
 from hippodrome.sim.scenario import DriveSpec, Scenario
 from hippodrome.sim.scene.build import build_scene
 from hippodrome.sim.self_motion import SelfMotionNoise, sense_self_motion
 from hippodrome.sim.town import build_town
 from hippodrome.sim.types import Drive, Town, TrafficLog
+
+if TYPE_CHECKING:
+    from hippodrome.sim.render.renderer import FrameRenderer
 
 Role: TypeAlias = Literal["mapping", "localization"]
 ROLES: tuple[Role, ...] = ("mapping", "localization")
@@ -148,6 +150,8 @@ _live: list[tuple[tuple[Scenario, Role], FrameRenderer]] = []
 
 def _renderer(plan: RecordingPlan) -> FrameRenderer:
     """The process's one live renderer: a second EGL context beside it would break it."""
+    from hippodrome.sim.render.renderer import FrameRenderer  # not before a frame is drawn: commands that draw none need no GL
+
     key = (plan.scenario, plan.role)
     if not _live or _live[0][0] != key:
         close_renderer()

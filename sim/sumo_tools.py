@@ -9,6 +9,7 @@ from typing import Final
 
 import sumo
 
+from hippodrome._processes import dying_with_me
 from hippodrome.core.types import HippodromeError
 
 TOOL_TIMEOUT_S: Final = 120.0  # netconvert takes 0.1 s for a generated town and some 10 s for a city
@@ -27,7 +28,15 @@ def run_tool(name: str, *options: str) -> None:
     environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
     command = [sumo_binary(name), *options]
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=TOOL_TIMEOUT_S, check=False)
+        done = subprocess.run(
+            command,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=TOOL_TIMEOUT_S,
+            check=False,
+            preexec_fn=dying_with_me(),
+        )
     except subprocess.TimeoutExpired as error:
         raise HippodromeError(f"{name}: no answer within {TOOL_TIMEOUT_S:.0f} s; make the network smaller") from error
     if done.returncode != 0:

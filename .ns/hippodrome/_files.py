@@ -1,7 +1,7 @@
 """Files that are whole or absent, and hashes of files and of code. For all parts of the package; not public.
 
-This module lies beneath ``core``, ``sim``, ``proto`` and ``eval``, so that each of them may use it. It imports the standard
-library and ``HippodromeError``, nothing else.
+This module lies beneath ``core``, ``sim``, ``proto`` and ``eval``, as ``_folders`` and ``_processes`` do, so that each of them
+may use it. They import the standard library, one another and ``HippodromeError``, nothing else.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from hippodrome._folders import PART, lock_or_none, sweep_files
 from hippodrome.core.types import HippodromeError
 
 PACKAGE: Final = Path(__file__).parent  # the folder in which ``core``, ``sim``, ``proto`` and ``eval`` lie
@@ -26,21 +27,41 @@ def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary file beside ``path``, which takes that name only when the block ends without an error.
 
     By then its bytes are on disk; until then, and after an error, whatever was at ``path`` stays as it was. The folder is made
-    if need be. The finished file may be read by everybody.
+    if need be. The finished file may be read by whom the umask lets. What a killed process left of the same file is swept.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
+    sweep_files(path.parent, path.name)
+    handle, temporary = _held_file(path)
     try:
         yield temporary
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
-        temporary.chmod(0o644)  # a temporary file is private by default
+        temporary.chmod(allowed(0o666))  # a temporary file is private by default
         temporary.replace(path)
         _sync_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def _held_file(path: Path) -> tuple[int, Path]:
+    """A new file beside ``path``, and the handle whose lock says that somebody is writing it."""
+    while True:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=PART, dir=path.parent)
+        if lock_or_none(handle) is not False and Path(name).exists():  # else a sweeper took it before it was locked
+            return handle, Path(name)
+        os.close(handle)
+
+
+def allowed(mode: int) -> int:
+    """The permissions that the process's umask leaves of ``mode``."""
+    try:  # Linux tells the umask without its being set, which another thread would notice
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+        umask = int(next(line.split()[1] for line in lines if line.startswith("Umask:")), 8)
+    except (OSError, ValueError, StopIteration):
+        umask = os.umask(0o077)
+        os.umask(umask)
+    return mode & ~umask
 
 
 def write_atomically(path: Path, data: bytes) -> None:

@@ -14,7 +14,7 @@ from hippodrome.core.types import StartPose
 from hippodrome.sim.geo_start import GeoStart
 from hippodrome.sim.renamed import present_value
 
-DONE, THRESHOLD_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, THRESHOLD_FAILED, BAD_INPUT, OUR_FAULT, INTERRUPTED = 0, 1, 2, 70, 130
 
 Command: TypeAlias = Callable[[argparse.Namespace], int]  # takes the options and answers with the exit status
 
@@ -101,11 +101,25 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def add_out(parser: argparse.ArgumentParser, default: str) -> None:
-    """The folder of the results."""
+    """The folder of the results, in which the parser's command writes alone."""
+    write_alone(parser)
     parser.add_argument(
         "--out", type=Path, default=Path(default), metavar="DIR",
         help=f"folder for the results; what is finished in it is not made again (default: {default})",
     )  # fmt: skip
+
+
+def write_alone(parser: argparse.ArgumentParser) -> None:
+    """Let no two commands write in one folder ``--out``: the later one is refused with a sentence."""
+    run: Command = parser.get_default("command")
+
+    def alone(options: argparse.Namespace) -> int:
+        from hippodrome._folders import written_by_one
+
+        with written_by_one(options.out):
+            return run(options)
+
+    parser.set_defaults(command=alone)
 
 
 def positive(text: str) -> int:

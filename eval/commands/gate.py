@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_out, add_workers
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_workers
 
 SEEDS = (1, 2, 3)
 CANNOT_TELL = 3  # exit status of a gate that has too few pairs for a verdict
@@ -51,7 +51,10 @@ def add_gate_commands(commands: Any) -> None:
              "(without METHOD: topometric; default: the gate is run)",
     )  # fmt: skip
     add_workers(parser)
-    add_out(parser, "out/gate")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/gate"), metavar="DIR",
+        help="folder for the runs; recordings in it are not made again (default: out/gate)",
+    )  # fmt: skip
     parser.add_argument(
         "--junit",
         type=Path,
@@ -97,27 +100,27 @@ def _percent(text: str) -> float:
 
 
 def _gate(options: argparse.Namespace) -> int:
-    from rich.console import Console
-
+    from hippodrome._folders import written_by_one
     from hippodrome.eval.gate.baseline import read_baseline
     from hippodrome.eval.gate.power import print_power
     from hippodrome.eval.gate.run import GateRequest, gate
     from hippodrome.eval.gate.study import study_markdown
+    from hippodrome.eval.results.terminal import PlainConsole
 
     if options.power is not None:
-        print_power(read_baseline(options.baseline), options.power, Console())
+        print_power(read_baseline(options.baseline), options.power, PlainConsole())
         return DONE
     if options.study:
         print(study_markdown())
         return DONE
     names = ("scenarios", "seeds", "baseline", "update", "workers", "out", "junit", "town_limit")
-    return STATUS[gate(GateRequest(**{name: getattr(options, name) for name in names}))]
+    with written_by_one(options.out):
+        return STATUS[gate(GateRequest(**{name: getattr(options, name) for name in names}))]
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from rich.console import Console
-
     from hippodrome.eval.gate.two_runs import compare_folders
+    from hippodrome.eval.results.terminal import PlainConsole
 
-    compare_folders(options.before, options.after, Console())
+    compare_folders(options.before, options.after, PlainConsole())
     return DONE

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from rich.console import Console
-
 from hippodrome._files import write_atomically
 from hippodrome.eval.gate.baseline import Baseline, GateError, baseline_of, read_baseline, write_baseline
 from hippodrome.eval.gate.compare import Verdict, compare
 from hippodrome.eval.gate.report import junit_xml, outcome_of, print_verdict, summary_markdown
 from hippodrome.eval.gate.statistics import MIN_PAIRS
 from hippodrome.eval.results.model import Results
+from hippodrome.eval.results.terminal import PlainConsole
 from hippodrome.eval.results.thresholds import failed_limits
 from hippodrome.eval.run import load_scenarios, run_scenarios
 from hippodrome.sim.scenario import Thresholds
@@ -98,14 +97,14 @@ def _show_update(found: Baseline, path: Path, limits: Sequence[str]) -> None:
         print(f"limit, fails the gate with any baseline: {line}")
     if path.exists():
         try:
-            print_verdict(compare(found, read_baseline(path)), (), Console())
+            print_verdict(compare(found, read_baseline(path)), (), PlainConsole())
         except GateError as error:
             print(f"not comparable with the old baseline: {error}")
 
 
 def say(verdict: Verdict, limits: Sequence[str], junit: Path | None) -> str:
     """Tell the terminal, the CI system and GitHub; ``passed``, ``failed`` or ``cannot tell``."""
-    print_verdict(verdict, limits, Console())
+    print_verdict(verdict, limits, PlainConsole())
     if junit is not None:
         write_atomically(junit, junit_xml(verdict, limits))
     if summary := os.environ.get(SUMMARY):

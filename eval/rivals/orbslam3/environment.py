@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from hippodrome._processes import dying_with_me
 from hippodrome.core.types import HippodromeError
 
 PACKAGES = ("pyorbslam3==0.1.1", "numpy>=2.0")
@@ -31,7 +32,14 @@ def ensure_environment(folder: Path) -> Path:
 
 def _run(command: list[str], what: str) -> None:
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=INSTALL_LIMIT_S, check=False)
+        done = subprocess.run(
+            command,
+            capture_output=True,
+            text=True,
+            timeout=INSTALL_LIMIT_S,
+            check=False,
+            preexec_fn=dying_with_me(),
+        )
     except subprocess.TimeoutExpired:
         raise NotInstalled(f"{what} took more than {INSTALL_LIMIT_S:.0f} s") from None
     except OSError as error:

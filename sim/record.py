@@ -79,12 +79,21 @@ class RecordingPlan:
             "odometry_rate_hz": scenario.odometry_rate_hz,
             "noise": scenario.self_motion_noise.model_dump(mode="json"),
             "versions": {name: version(name) for name in ("eclipse-sumo", "highway-env", "numpy", "pyrender")},
+            "numpy_simd": numpy_simd(),
             "code_sha256": code_sha256(PACKAGE, RECORDING_CODE),
         }
 
     def folder(self) -> Path:
         key = hashlib.sha256(json.dumps(self.content(), sort_keys=True).encode()).hexdigest()[:16]
         return self.root / "recordings" / f"{self.scenario.name}-{self.role}-{key}"
+
+
+@lru_cache(maxsize=1)
+def numpy_simd() -> list[str]:
+    """The processor's extensions that NumPy computes with here: with others it rounds differently, and the drive is another one."""
+    extensions: Any = np.show_config(mode="dicts")
+    simd = extensions.get("SIMD Extensions", {})
+    return [*simd.get("baseline", ()), *simd.get("found", ())]
 
 
 @lru_cache(maxsize=4)

@@ -90,7 +90,7 @@ class RecordingPlan:
 
 @lru_cache(maxsize=1)
 def numpy_simd() -> list[str]:
-    """The processor's extensions that NumPy computes with here: with others it rounds differently, and the drive is another one."""
+    """The processor's extensions that NumPy computes with here: with others it rounds differently and draws another drive."""
     extensions: Any = np.show_config(mode="dicts")
     simd = extensions.get("SIMD Extensions", {})
     return [*simd.get("baseline", ()), *simd.get("found", ())]

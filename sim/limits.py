@@ -26,6 +26,7 @@ LARGEST: Final = {  # by the last word of the name: a long motorway, a day, a tu
     "m": 1e6, "s": 1e5, "rad": 100.0, "deg": 360.0, "hz": 1e4, "mps": 400.0, "nats": 1e6, "px": 4096.0, "db": 200.0,
 }  # fmt: skip
 LARGEST_FACTOR: Final = 1e4  # a number without a unit may be so many times its default
+SMALLEST_DIVISOR: Final = 1e4  # of what is divided by, the least is this part of the default: a finer grid fills the memory
 LARGEST_COUNT_FACTOR: Final = 100  # and a whole one so many times: it is the size of something
 ANGLES_OF_VIEW: Final = {"fov_deg": (20.0, 150.0)}  # as the scenario's camera
 
@@ -40,9 +41,9 @@ def limit_numbers(schema: CoreSchema, resolve: Callable[[Any], Any]) -> None:
     for name, default, number in _numbers(schema, resolve, "", None, set()):
         if number["type"] == "float":
             number["allow_inf_nan"] = _unlimited(default)
-        low, strict, high = _limits(name, default, number["type"] == "int")
+        low, high = _limits(name, default, number["type"] == "int")
         if not {"ge", "gt"} & set(number):
-            number["gt" if strict else "ge"] = low
+            number["ge"] = low
         if not {"le", "lt"} & set(number):
             number["le"] = high
 
@@ -86,11 +87,10 @@ def _unlimited(default: Any) -> bool:
     return isinstance(default, float) and math.isinf(default)
 
 
-def _limits(name: str, default: Any, whole: bool) -> tuple[float, bool, float]:
-    """The least value of a key, whether that itself is excluded, and the largest."""
+def _limits(name: str, default: Any, whole: bool) -> tuple[float, float]:
+    """The least value of a key, and the largest."""
     if name in ANGLES_OF_VIEW:
-        low, high = ANGLES_OF_VIEW[name]
-        return low, False, high
+        return ANGLES_OF_VIEW[name]
     usual = abs(float(default)) if isinstance(default, int | float) and not _unlimited(default) else 1.0
     high = LARGEST.get(name.rpartition("_")[2], LARGEST_FACTOR * max(usual, 1.0))
     if whole:
@@ -100,11 +100,11 @@ def _limits(name: str, default: Any, whole: bool) -> tuple[float, bool, float]:
     if _ends(name, SHARES):
         high = 1.0
     if isinstance(default, int | float) and default < 0:
-        return -high, False, high
+        return -high, high
     divides = _ends(name, DIVISORS) and default != 0
     if whole:
-        return (1 if divides else 0), False, int(high)
-    return 0.0, divides, high
+        return (1 if divides else 0), int(high)
+    return (usual / SMALLEST_DIVISOR if divides else 0.0), high
 
 
 def _ends(name: str, words: tuple[str, ...]) -> bool:

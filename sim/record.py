@@ -18,9 +18,11 @@ from hippodrome.core.types import Frame
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.episode import Samples, camera_divider, draw_frame, sample_drive
 from hippodrome.sim.recording import (
+    ANEW,
     CHUNK_FRAMES,
     MANIFEST,
     Recording,
+    RecordingError,
     chunk_count,
     chunk_path,
     open_recording,
@@ -208,7 +210,11 @@ def _write_drive(path: Path, drive: Drive) -> None:
 def _read_drive(path: Path) -> Drive:
     log_names = [field.name for field in fields(TrafficLog)]
     names = [field.name for field in fields(Drive) if field.name != "traffic"]
-    arrays = read_arrays(path, [*names, *(f"traffic_{name}" for name in log_names)])
-    log = TrafficLog(**{name: arrays.pop(f"traffic_{name}") for name in log_names})
-    coverage, revisit_share = float(arrays.pop("coverage")), float(arrays.pop("revisit_share"))
+    try:
+        arrays = read_arrays(path, [*names, *(f"traffic_{name}" for name in log_names)])
+        log = TrafficLog(**{name: arrays.pop(f"traffic_{name}") for name in log_names})
+        coverage, revisit_share = float(arrays.pop("coverage")), float(arrays.pop("revisit_share"))
+    except Exception as error:  # as of the samples
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise RecordingError(f"{path}: not a readable drive ({reason}); {ANEW}") from None
     return Drive(**arrays, traffic=log, coverage=coverage, revisit_share=revisit_share)

@@ -44,7 +44,7 @@ def route_segments(route: Route, explained: BoolArray, nats_per_rad: float) -> l
     jumped = np.abs(np.diff(route.log_scale, prepend=route.log_scale[0])) > _JUMP
     begins = np.diff(explained.astype(np.int8), prepend=0) != 0
     cuts = np.flatnonzero(begins | (jumped & explained))
-    ends = np.append(cuts[1:], len(explained))
+    ends = np.append(cuts[1:], len(explained))[: len(cuts)]  # a route that explains nothing has no cut and no end
     step_nats = route.score_nats * ~(begins | jumped)  # the step that leads into a segment does not count against it
     gain = step_nats + nats_per_rad * turning_rad(route.track)
     return [

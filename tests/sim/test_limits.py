@@ -64,7 +64,12 @@ def test_no_key_takes_a_number_that_is_none(number):
 
 
 def test_no_key_below_zero_unless_it_has_a_side():
-    sided = {"camera.forward_m", "camera.yaw_offset_deg", "localizer.camera.forward_m", "refine.route.confidence.least_score_nats"}
+    sided = {
+        "camera.forward_m",
+        "camera.yaw_offset_deg",
+        "localizer.camera.forward_m",
+        "refine.route.confidence.least_score_nats",
+    }
     for path, usual in KEYS:
         name = ".".join(path)
         if name in sided or "azimuth" in name:

@@ -28,6 +28,7 @@ LARGEST: Final = {  # by the last word of the name: a long motorway, a day, a tu
 LARGEST_FACTOR: Final = 1e4  # a number without a unit may be so many times its default
 SMALLEST_DIVISOR: Final = 1e4  # of what is divided by, the least is this part of the default: a finer grid fills the memory
 LARGEST_COUNT_FACTOR: Final = 100  # and a whole one so many times: it is the size of something
+ENDLESS: Final = ("bent_cost",)  # keys of which infinity switches something off, though their default is finite
 ANGLES_OF_VIEW: Final = {"fov_deg": (20.0, 150.0)}  # as the scenario's camera
 
 
@@ -40,7 +41,8 @@ def limit_numbers(schema: CoreSchema, resolve: Callable[[Any], Any]) -> None:
     """
     for name, default, number in _numbers(schema, resolve, "", None, set()):
         if number["type"] == "float":
-            number["allow_inf_nan"] = _unlimited(default)
+            number["allow_inf_nan"] = endless = _unlimited(default) or name in ENDLESS
+            default = math.inf if endless else default
         low, high = _limits(name, default, number["type"] == "int")
         if not {"ge", "gt"} & set(number):
             number["ge"] = low

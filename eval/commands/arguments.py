@@ -130,6 +130,14 @@ def positive(text: str) -> int:
     return value
 
 
+def positive_number(text: str) -> float:
+    """A finite number above 0."""
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return value
+
+
 def seed(text: str) -> int:
     """A seed: SUMO takes 31 bits."""
     value = int(text)
@@ -145,7 +153,9 @@ def start_pose(text: str) -> StartPose | GeoStart:
     try:
         x_m, y_m, heading_deg = (float(part) for part in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is not X,Y,HEADING (metres, metres, degrees)") from None
+        x_m = y_m = heading_deg = math.nan
+    if not (math.isfinite(x_m) and math.isfinite(y_m) and math.isfinite(heading_deg)):
+        raise argparse.ArgumentTypeError(f"'{text}' is not X,Y,HEADING (metres, metres, degrees)")
     return StartPose(x_m, y_m, math.radians(heading_deg))
 
 

@@ -11,6 +11,7 @@ import pytest
 import hippodrome.eval.cli
 from hippodrome._processes import Terminated
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.cli import main
 from hippodrome.eval.commands.boundary import guarded, machine_fault, make_numba_cache, one_line
 
 SOURCE = Path(hippodrome.eval.cli.__file__).parents[1]
@@ -125,3 +126,18 @@ except Exception as error:
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("HippodromeError no off-screen OpenGL: install the system package")
+
+
+@pytest.mark.parametrize("arguments", [
+    ["refine", "m", "--network", "n", "--out", "o", "--start", "nan,0,0"],
+    ["refine", "m", "--network", "n", "--out", "o", "--start", "0,inf,0"],
+    ["refine", "m", "--network", "n", "--out", "o", "--start", "0,0"],
+    ["baselines", "a.yaml", "--seconds", "nan"],
+    ["baselines", "a.yaml", "--seconds", "-1"],
+    ["gate", "a.yaml", "--town-limit", "nan"],
+    ["gate", "a.yaml", "--town-limit", "0"],
+])  # fmt: skip
+def test_options_take_no_numbers_that_are_none(arguments, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2 and "error: argument" in capsys.readouterr().err

@@ -1,6 +1,8 @@
 """What a command leaves behind, however it ends: no process, no temporary folder, no unfinished file."""
 
+import errno
 import os
+import pickle
 import signal
 import stat
 import subprocess
@@ -20,6 +22,7 @@ from hippodrome._folders import (
 )
 from hippodrome._processes import Terminated, dying_with_me, ending_like_an_interrupt
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.commands.boundary import machine_fault
 
 POOL = """
 import os, signal, sys, time
@@ -203,3 +206,12 @@ def test_files_have_the_permissions_that_the_umask_leaves(tmp_path, umask, mode)
     finally:
         os.umask(before)
     assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == mode
+
+
+def test_a_disk_that_is_full_is_named_with_the_file(tmp_path):
+    with pytest.raises(OSError, match="No space left") as caught, replacing(tmp_path / "a.json"):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert machine_fault(pickle.loads(pickle.dumps(caught.value))).startswith(
+        f"{tmp_path / 'a.json'}: No space left on device; free"
+    )
+    assert not list(tmp_path.iterdir())

@@ -39,6 +39,10 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.chmod(allowed(0o666))  # a temporary file is private by default
         temporary.replace(path)
         _sync_folder(path.parent)
+    except OSError as error:
+        if error.errno is not None and error.filename is None:
+            error.filename = str(path)  # a full disk is met while writing, and does not know of which file
+        raise
     finally:
         temporary.unlink(missing_ok=True)
         os.close(handle)

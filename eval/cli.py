@@ -1,16 +1,15 @@
-"""The command line. Exit status: 0 done, 1 a threshold failed, 2 bad input, 130 interrupted."""
+"""The command line. Exit status: 0 done, 1 a limit missed, 2 bad input, 3 the gate cannot tell, 70 our fault, 130 interrupted."""
 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from typing import Any
 
-from hippodrome.core.types import HippodromeError
-from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, INTERRUPTED, Command, HelpLayout, print_help
+from hippodrome.eval.commands.arguments import Command, HelpLayout, print_help
 from hippodrome.eval.commands.authoring import add_scenario_command
+from hippodrome.eval.commands.boundary import guarded, make_numba_cache
 from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands
 from hippodrome.eval.commands.run import add_drive_command
@@ -36,30 +35,28 @@ examples:
   hippodrome refine out/grid/semi.pbstream --network out/grid/towns/*.net.xml --out out/grid/topo.pbstream
   hippodrome localize out/grid/topo.pbstream out/grid/recordings/grid-localization-* --out out/grid/drive.tum
 
-exit status: 0 done, 1 a threshold or a cell failed, 2 bad input (nothing is overwritten), 130 interrupted (rerun to resume)
+exit status: 0 done, 1 a threshold or a cell failed, 2 bad input (nothing is overwritten), 3 the gate cannot tell,
+             70 a fault of hippodrome (please report it), 130, 143, 129 interrupted, terminated, hung up (rerun to resume)
 """
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of the command ``hippodrome``; the exit status."""
     options = make_parser().parse_args(arguments)
-    command: Command = options.command
+    return guarded(lambda: _run(options))
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Run the command that was asked for, in a process that is set up for it; what it raises is told by ``guarded``."""
+    from hippodrome._folders import sweep_temporary
+
+    sweep_temporary()
+    make_numba_cache()  # before anything is imported that compiles
     from hippodrome.eval.pool import one_opencv_thread  # not before the arguments are read: --help answers at once
 
     one_opencv_thread()
-    try:
-        status = command(options)
-        sys.stdout.flush()  # what is still to be printed meets a closed pipe here, where it is handled, or not at all
-        return status
-    except BrokenPipeError:  # the reader of our output, `head` for one, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return DONE
-    except HippodromeError as error:
-        print(f"hippodrome: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        print("hippodrome: interrupted; what was finished is kept, the same command resumes", file=sys.stderr)
-        return INTERRUPTED
+    command: Command = options.command
+    return command(options)
 
 
 def make_parser() -> argparse.ArgumentParser:

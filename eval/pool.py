@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -19,8 +20,12 @@ import cv2
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from hippodrome._processes import ENDING, die_with_parent, end_children
 from hippodrome.core.types import HippodromeError
 
+# In this time an executor's thread forgets the tasks that were cancelled. CPython 3.11 stumbles over them, with a traceback, if
+# the processes are gone first.
+SETTLE_S = 0.2
 INTERRUPTED = 130  # exit status by which a shell knows a process that was interrupted
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
@@ -94,8 +99,19 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker)
     try:
         yield executor
+    except BaseException as error:
+        if not isinstance(error, Exception):  # an interrupt or a signal: nobody waits for what the processes are at
+            _abandon(executor)
+        raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
+
+
+def _abandon(executor: ProcessPoolExecutor) -> None:
+    """End the processes in the middle of their tasks."""
+    executor.shutdown(wait=False, cancel_futures=True)
+    time.sleep(SETTLE_S)
+    end_children()
 
 
 def progress_bar() -> Progress:
@@ -121,12 +137,18 @@ def one_opencv_thread() -> None:
 
 
 def _quiet_worker() -> None:
-    """Set up a worker: it uses one core, as the pool is the parallelism, and what libraries print goes to standard error."""
+    """Set up a worker: it uses one core, as the pool is the parallelism, and what libraries print goes to standard error.
+
+    It ends when the process that started it ends, however that does, and when it is asked to.
+    """
+    if (parent := multiprocessing.parent_process()) is not None and parent.pid is not None:
+        die_with_parent(parent.pid)
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     one_opencv_thread()
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a shell lets commands in the background ignore interrupts
-        signal.signal(signal.SIGINT, _leave)
+    for number in (signal.SIGINT, *ENDING):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # a shell lets commands in the background ignore interrupts
+            signal.signal(number, _leave)
     sys.stdout = sys.stderr
 
 
@@ -147,5 +169,7 @@ def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
     Nothing that follows may print either: a worker between two tasks may find a message in the queue that another one has left
     half read, and would complain.
     """
+    for number in (signal.SIGINT, *ENDING):
+        signal.signal(number, signal.SIG_IGN)  # a second one must not break off the clearing away
     sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115  # until the process ends
     raise SystemExit(INTERRUPTED)

@@ -11,8 +11,6 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.console import Console
-
 from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
@@ -22,6 +20,7 @@ from hippodrome.eval.report.report import REPORT, write_report
 from hippodrome.eval.results.model import Results, write_results
 from hippodrome.eval.results.paper_rows import quoted_rows
 from hippodrome.eval.results.tables import print_table_one, table_one_markdown
+from hippodrome.eval.results.terminal import PlainConsole
 from hippodrome.eval.results.thresholds import failed_limits
 from hippodrome.sim.record import ROLES, RecordingPlan, finish, prepare, render_chunk
 from hippodrome.sim.recording import CHUNK_FRAMES
@@ -101,7 +100,7 @@ def _finish(plan: RecordingPlan) -> None:
 
 def _report(scenarios: Sequence[Scenario], results: Results, out: Path) -> bool:
     """Print tables, thresholds that do not hold, and where the files are. Returns whether all thresholds hold."""
-    print_table_one(results, quoted_rows(), Console())
+    print_table_one(results, quoted_rows(), PlainConsole())
     failures = [
         f"{result.name}: {limit}"
         for scenario, result in zip(scenarios, results.scenarios, strict=True)

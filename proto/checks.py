@@ -10,6 +10,9 @@ import numpy as np
 from hippodrome.core.types import CognitiveMap, EdgeKind, MatchStatus, RoadMatch
 from hippodrome.proto.arrays import Array, FieldError
 
+MOST_SECONDS = 1e11  # of a time stamp: the year 5138
+MOST_UNITS = 1e9  # of a position or a motion, in units of any length from a millimetre up; squares of it are still exact enough
+MOST_LOG_SCALE = 50.0  # ln of metres per unit
 MAX_DESCRIPTOR_DIMENSIONS = 8  # rows, columns, bins and room to grow
 
 
@@ -32,8 +35,23 @@ def check_map(cognitive_map: CognitiveMap) -> None:
         ("visits.vertex", cognitive_map.visits.vertex, vertices),
     ):
         _require((index >= 0) & (index < count), name, f"outside 0..{count - 1}")
+    for name, array, most in _magnitudes(cognitive_map):
+        _require(np.abs(array) <= most, name, f"beyond {most:g}, which no vehicle does")
+    _require(np.diff(cognitive_map.visits.t_s) >= 0.0, "visits.t_s", "followed by an earlier one")
+    _require(edges.sigma > 0.0, "edges.sigma", "not above zero")
     if cognitive_map.road_match is not None:
         _check_road_match(cognitive_map.road_match)
+
+
+def _magnitudes(cognitive_map: CognitiveMap) -> Iterator[tuple[str, Array, float]]:
+    """Arrays whose finite values may still be none, and the largest absolute value of each."""
+    yield "t_s", cognitive_map.t_s, MOST_SECONDS
+    yield "visits.t_s", cognitive_map.visits.t_s, MOST_SECONDS
+    yield "poses", cognitive_map.poses, MOST_UNITS
+    yield "edges.motion", cognitive_map.edges.motion, MOST_UNITS
+    yield "visits.motion", cognitive_map.visits.motion, MOST_UNITS
+    if cognitive_map.log_scale is not None:
+        yield "log_scale", cognitive_map.log_scale, MOST_LOG_SCALE
 
 
 def _check_road_match(match: RoadMatch) -> None:

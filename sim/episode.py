@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +12,13 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import FloatArray, Frame, GroundTruth, IntArray, Observation, Step
 from hippodrome.sim.render.camera import CameraSpec
-from hippodrome.sim.render.renderer import FrameRenderer
 from hippodrome.sim.scene.conditions import Conditions, apply_camera
 from hippodrome.sim.self_motion import SelfMotion
 from hippodrome.sim.traffic import traffic_at
 from hippodrome.sim.types import Drive
+
+if TYPE_CHECKING:
+    from hippodrome.sim.render.renderer import FrameRenderer
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,6 +23,7 @@ NO_PROJECTION = ("", "!", "-", ".", "0")  # what SUMO writes where there is none
 MAX_HEAD_BYTES = 4 << 20  # <location> is the first element of a network; comments may stand before it
 GPS_SIGMA_M = 8.0  # a fix of a phone between houses, and the error of a map beside it
 UNKNOWN_SIGMA_RAD = 10.0  # all headings are as likely: the opposite one costs 0.05 nats
+REAL_MAP_SIGMA_M = 2.5  # standard deviation in each axis of a map of real roads: OpenStreetMap is off by 2-6 m (Haklay 2010)
 STEP_M = 1.0  # how far one goes into a compass direction to see where it points in the network
 
 
@@ -97,6 +98,14 @@ def read_georeference(net_file: Path) -> GeoReference:
     reference = GeoReference(projection, (x_m, y_m), net_file.name)
     _transformer(projection, net_file.name)
     return reference
+
+
+def is_georeferenced(net_file: Path) -> bool:
+    """Whether a SUMO network says where on Earth it lies, as maps of real roads do. It is not asked whether its projection is known.
+
+    Raises GeoReferenceError if the file cannot be read.
+    """
+    return _location(net_file).get("projParameter", "").strip() not in NO_PROJECTION
 
 
 def placed_start(start: StartPose | GeoStart | None, network: Path, mode: str = "route") -> StartPose | None:

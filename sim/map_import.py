@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-import tempfile
 import zlib
 from pathlib import Path
 from typing import Final
 
 from hippodrome._files import replacing, sha256_of, write_atomically
+from hippodrome._folders import temporary_folder
 from hippodrome.core.types import HippodromeError
 from hippodrome.sim.driving_side import Choice, DrivingSide, opendrive_side, osm_side
 from hippodrome.sim.netconvert_notes import SPIRALS, netconvert_notes
@@ -105,9 +105,9 @@ def import_map(source: Path, net_file: Path, driving_side: Choice = "auto") -> t
         raise HippodromeError(f"{source}: no such file")
     if source.stat().st_size > MAX_UNPACKED_BYTES:
         raise _too_large(source)
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         ending = ".osm" if source.name.lower().endswith(OSM) else ".xodr"
-        plain, made = Path(folder) / f"map{ending}", Path(folder) / "made.net.xml"
+        plain, made = folder / f"map{ending}", folder / "made.net.xml"
         _unpack(source, plain)
         root_of(plain, named=source)
         notes = _convert(source, plain, made, driving_side)

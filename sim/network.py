@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
+from hippodrome.sim.georeference import REAL_MAP_SIGMA_M, is_georeferenced
 from hippodrome.sim.net_file import SumoLane, SumoNet, is_left_hand, load_net
 
 MIN_LANE_M: Final = 0.01  # SUMO writes coordinates in centimetres; a shorter lane is a point
@@ -61,6 +62,7 @@ def road_network(net: SumoNet, net_file: Path) -> RoadNetwork:
         successor_start=_starts(successors),
         left_lane=upper if right_is_lower else lower,
         right_lane=lower if right_is_lower else upper,
+        survey_sigma_m=REAL_MAP_SIGMA_M if is_georeferenced(net_file) else 0.0,
     )
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -18,9 +18,11 @@ from hippodrome.core.types import Frame
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.episode import Samples, camera_divider, draw_frame, sample_drive
 from hippodrome.sim.recording import (
+    ANEW,
     CHUNK_FRAMES,
     MANIFEST,
     Recording,
+    RecordingError,
     chunk_count,
     chunk_path,
     open_recording,
@@ -30,12 +32,14 @@ from hippodrome.sim.recording import (
     write_arrays,
     write_chunk,
 )
-from hippodrome.sim.render.renderer import FrameRenderer
 from hippodrome.sim.scenario import DriveSpec, Scenario
 from hippodrome.sim.scene.build import build_scene
 from hippodrome.sim.self_motion import SelfMotionNoise, sense_self_motion
 from hippodrome.sim.town import build_town
 from hippodrome.sim.types import Drive, Town, TrafficLog
+
+if TYPE_CHECKING:
+    from hippodrome.sim.render.renderer import FrameRenderer
 
 Role: TypeAlias = Literal["mapping", "localization"]
 ROLES: tuple[Role, ...] = ("mapping", "localization")
@@ -77,12 +81,21 @@ class RecordingPlan:
             "odometry_rate_hz": scenario.odometry_rate_hz,
             "noise": scenario.self_motion_noise.model_dump(mode="json"),
             "versions": {name: version(name) for name in ("eclipse-sumo", "highway-env", "numpy", "pyrender")},
+            "numpy_simd": numpy_simd(),
             "code_sha256": code_sha256(PACKAGE, RECORDING_CODE),
         }
 
     def folder(self) -> Path:
         key = hashlib.sha256(json.dumps(self.content(), sort_keys=True).encode()).hexdigest()[:16]
         return self.root / "recordings" / f"{self.scenario.name}-{self.role}-{key}"
+
+
+@lru_cache(maxsize=1)
+def numpy_simd() -> list[str]:
+    """The processor's extensions that NumPy computes with here: with others it rounds differently and draws another drive."""
+    extensions: Any = np.show_config(mode="dicts")
+    simd = extensions.get("SIMD Extensions", {})
+    return [*simd.get("baseline", ()), *simd.get("found", ())]
 
 
 @lru_cache(maxsize=4)
@@ -148,6 +161,8 @@ _live: list[tuple[tuple[Scenario, Role], FrameRenderer]] = []
 
 def _renderer(plan: RecordingPlan) -> FrameRenderer:
     """The process's one live renderer: a second EGL context beside it would break it."""
+    from hippodrome.sim.render.renderer import FrameRenderer  # not before a frame is drawn: commands that draw none need no GL
+
     key = (plan.scenario, plan.role)
     if not _live or _live[0][0] != key:
         close_renderer()
@@ -195,7 +210,11 @@ def _write_drive(path: Path, drive: Drive) -> None:
 def _read_drive(path: Path) -> Drive:
     log_names = [field.name for field in fields(TrafficLog)]
     names = [field.name for field in fields(Drive) if field.name != "traffic"]
-    arrays = read_arrays(path, [*names, *(f"traffic_{name}" for name in log_names)])
-    log = TrafficLog(**{name: arrays.pop(f"traffic_{name}") for name in log_names})
-    coverage, revisit_share = float(arrays.pop("coverage")), float(arrays.pop("revisit_share"))
+    try:
+        arrays = read_arrays(path, [*names, *(f"traffic_{name}" for name in log_names)])
+        log = TrafficLog(**{name: arrays.pop(f"traffic_{name}") for name in log_names})
+        coverage, revisit_share = float(arrays.pop("coverage")), float(arrays.pop("revisit_share"))
+    except Exception as error:  # as of the samples
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise RecordingError(f"{path}: not a readable drive ({reason}); {ANEW}") from None
     return Drive(**arrays, traffic=log, coverage=coverage, revisit_share=revisit_share)

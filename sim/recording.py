@@ -19,14 +19,18 @@ from typing import Any
 import cv2
 import numpy as np
 
-from hippodrome._files import replacing, sha256_of
+from hippodrome._files import read_bounded, replacing, sha256_of
 from hippodrome.core.types import Frame, HippodromeError, Observation, Step, Trajectory
 from hippodrome.sim.episode import Samples
+from hippodrome.sim.recording_checks import MAX_FRAME_BYTES, check_samples, decoded_png
 
 FORMAT = 1
 CHUNK_FRAMES = 250  # a few seconds of rendering: what a kill can cost at most, and what a second process can take over
 PNG_LEVEL = 1  # fastest: level 3 saves 6 % of the space for twice the time
 MANIFEST = "manifest.json"
+MAX_MANIFEST_BYTES = 16 << 20  # a line for each quarter of a minute
+MAX_ARRAY_BYTES = 1 << 30  # of one file of arrays; a day at 10 Hz takes 80 MB
+ANEW = "delete the recording to make it anew"
 MAX_STEPS = 20_000_000  # refuse hostile sizes before memory is taken: 20 days at 11 Hz
 
 
@@ -67,15 +71,15 @@ class Recording:
         """RGB frame (H, W, 3); ``side`` is "r" for the right image of a stereo pair."""
         path = chunk_path(self.folder, number // CHUNK_FRAMES)
         try:
-            blob = _open_chunk(path, path.stat().st_mtime_ns).read(frame_name(number, side))
-        except (OSError, KeyError, zipfile.BadZipFile, zipfile.LargeZipFile) as error:
-            raise RecordingError(
-                f"{path}: frame {number} cannot be read ({error}); delete the recording to render it anew"
-            ) from None
-        image = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
-        if image is None:
-            raise RecordingError(f"{path}: frame {number} is not a PNG image; delete the recording to render it anew")
-        return np.ascontiguousarray(image[:, :, ::-1])
+            archive = _open_chunk(path, path.stat().st_mtime_ns)
+            entry = archive.getinfo(frame_name(number, side))
+            if entry.file_size > MAX_FRAME_BYTES:  # no more than this is unpacked of it, whatever comes
+                raise ValueError(f"{entry.file_size} bytes, the limit is {MAX_FRAME_BYTES}")
+            return decoded_png(archive.read(entry))
+        except MemoryError:
+            raise
+        except Exception as error:  # packed in a way that is not known, encrypted, cut short: zipfile has an exception for each
+            raise RecordingError(f"{path}: frame {number} cannot be read ({_said(error)}); {ANEW}") from None
 
 
 @lru_cache(maxsize=4)
@@ -114,24 +118,26 @@ def read_samples(path: Path) -> Samples:
     """Samples back from disk, checked. Raises RecordingError."""
     try:
         arrays = read_arrays(path, [field.name for field in fields(Samples)])
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile, MemoryError) as error:
-        raise RecordingError(f"{path}: not a readable sample file ({error}); delete the recording to make it anew") from None
-    count = len(arrays["t_s"])
-    same = all(len(array) == count for name, array in arrays.items() if name != "lane_ids")
-    if not same or count == 0 or count > MAX_STEPS or arrays["poses_m"].shape != (count, 3):
-        raise RecordingError(f"{path}: its arrays do not fit together; delete the recording to make it anew")
+        check_samples(arrays, MAX_STEPS)
+    except Exception as error:  # NumPy, zipfile and zlib have many, and a claimed size may be beyond all memory
+        raise RecordingError(f"{path}: not a readable sample file ({_said(error)}); {ANEW}") from None
     lane_ids = tuple(str(name) for name in arrays.pop("lane_ids"))
     return Samples(**arrays, lane_ids=lane_ids)
 
 
 def read_arrays(path: Path, names: list[str]) -> dict[str, np.ndarray[Any, np.dtype[Any]]]:
     """Arrays of an npz file that are stored as they are: a packed one could claim any size and is refused."""
-    blob = path.read_bytes()
+    blob = read_bounded(path, MAX_ARRAY_BYTES)
     with zipfile.ZipFile(io.BytesIO(blob)) as archive:
         if any(item.compress_type != zipfile.ZIP_STORED or item.file_size > len(blob) for item in archive.infolist()):
             raise ValueError("packed arrays")
     with np.load(io.BytesIO(blob), allow_pickle=False) as data:
         return {name: data[name] for name in names}
+
+
+def _said(error: Exception) -> str:
+    """An exception in a line; some say nothing but their name."""
+    return " ".join(str(error).split())[:200] or type(error).__name__
 
 
 def seal(folder: Path, content: dict[str, Any], samples: Samples) -> Recording:
@@ -147,7 +153,7 @@ def open_recording(folder: Path, verify: bool = True) -> Recording:
     """A finished recording; ``verify`` compares every file with its hash first. Raises RecordingError."""
     path = folder / MANIFEST
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest = json.loads(read_bounded(path, MAX_MANIFEST_BYTES).decode("utf-8"))
         files = manifest["sha256"]
         version = manifest["format"]
     except FileNotFoundError:
@@ -155,7 +161,7 @@ def open_recording(folder: Path, verify: bool = True) -> Recording:
             f"{folder}: not a finished recording (no {MANIFEST}); run `hippodrome render` to finish it"
         ) from None
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise RecordingError(f"{path}: not a recording's manifest ({error})") from None
+        raise RecordingError(f"{path}: not a recording's manifest ({_said(error)}); {ANEW}") from None
     if version != FORMAT:
         raise RecordingError(f"{path}: recording format {version}, this version reads {FORMAT}")
     if not isinstance(files, dict) or "samples.npz" not in files:
@@ -164,13 +170,13 @@ def open_recording(folder: Path, verify: bool = True) -> Recording:
         _check_file(folder, name, digest if verify else None)
     samples = read_samples(folder / "samples.npz")
     if any(chunk_path(folder, chunk).name not in files for chunk in range(chunk_count(samples))):
-        raise RecordingError(f"{path}: frames are missing from the manifest; delete the recording to render it anew")
+        raise RecordingError(f"{path}: frames are missing from the manifest; delete the recording to make it anew")
     return Recording(folder, manifest, samples)
 
 
 def _check_file(folder: Path, name: str, digest: str | None) -> None:
     path = folder / name
     if Path(name).name != name or not path.is_file():
-        raise RecordingError(f"{path}: named in the manifest and not there; delete the recording to render it anew")
+        raise RecordingError(f"{path}: named in the manifest and not there; delete the recording to make it anew")
     if digest is not None and sha256_of(path) != digest:
-        raise RecordingError(f"{path}: truncated or changed since it was recorded; delete the recording to render it anew")
+        raise RecordingError(f"{path}: truncated or changed since it was recorded; delete the recording to make it anew")

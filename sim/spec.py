@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
+from pydantic_core import CoreSchema
+
+from hippodrome.sim.limits import limit_numbers
 
 
 class Spec(BaseModel):
-    """A part of a scenario. Defaults live in the subclasses only; YAML holds overrides."""
+    """A part of a scenario. Defaults live in the subclasses only; YAML holds overrides. Every number has limits."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = handler(source)
+        limit_numbers(schema, handler.resolve_ref_schema)
+        return schema

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Final
 import libsumo
 import numpy as np
 
+from hippodrome._folders import temporary_folder
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 from hippodrome.sim.network import HELD_PHASE_S
@@ -30,8 +30,8 @@ SIGHT_M: Final = 150.0  # vehicles farther from the ego are not logged
 @contextmanager
 def sumo_run(net_file: Path, vehicle_types: str, seed: int) -> Iterator[None]:
     """Starts SUMO on a network in this process and closes it whatever happens."""
-    with tempfile.TemporaryDirectory() as folder, without_comma(net_file) as named:
-        types_file = Path(folder) / "types.add.xml"
+    with temporary_folder() as folder, without_comma(net_file) as named:
+        types_file = folder / "types.add.xml"
         types_file.write_text(vehicle_types, encoding="utf-8")
         options = (
             f"--net-file={named}",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -14,6 +13,8 @@ from typing import Final
 
 import sumo
 
+from hippodrome._folders import temporary_folder
+from hippodrome._processes import dying_with_me
 from hippodrome.core.types import HippodromeError
 
 TOOL_TIMEOUT_S: Final = 120.0  # netconvert takes 0.1 s for a generated town and some 10 s for a city
@@ -46,7 +47,7 @@ def run_tool(name: str, *options: str, input_bytes: int = 0) -> None:
     command = [sumo_binary(name), *options]
     with subprocess.Popen(
         command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-        encoding="utf-8", errors="replace",
+        encoding="utf-8", errors="replace", preexec_fn=dying_with_me(),
     ) as child:  # fmt: skip
         _limit_memory(child.pid, TOOL_BYTES + BYTES_PER_INPUT_BYTE * input_bytes)
         try:
@@ -87,8 +88,8 @@ def without_comma(net_file: Path) -> Iterator[Path]:
     if "," not in str(net_file):
         yield net_file
         return
-    with tempfile.TemporaryDirectory() as folder:
-        link = Path(folder) / f"town{'.net.xml.gz' if net_file.suffix == '.gz' else '.net.xml'}"
+    with temporary_folder() as folder:
+        link = folder / f"town{'.net.xml.gz' if net_file.suffix == '.gz' else '.net.xml'}"
         link.symlink_to(net_file.resolve())
         yield link
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-import tempfile
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from itertools import product
@@ -16,6 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from hippodrome._files import replacing
+from hippodrome._folders import temporary_folder
 from hippodrome.core.types import FloatArray, HippodromeError
 from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
@@ -128,8 +128,8 @@ def _rng(seed: int) -> np.random.Generator:
 
 def _random_plan(street_m: float, size: int, seed: int) -> Plan:
     """netgenerate's random network of about ``size`` streets, without its dead ends."""
-    with tempfile.TemporaryDirectory() as folder:
-        prefix = Path(folder) / "random"
+    with temporary_folder() as folder:
+        prefix = folder / "random"
         run_tool(
             "netgenerate", "--rand", f"--rand.iterations={size}", f"--seed={seed % 2**31}",
             f"--rand.min-distance={0.7 * street_m:.2f}", f"--rand.max-distance={1.6 * street_m:.2f}",
@@ -151,8 +151,8 @@ def _read_plain(nodes_file: Path, edges_file: Path) -> Plan:
 
 def _write_plan_as_net(plan: Plan, spec: TownSpec, net_file: Path) -> None:
     """netconvert's network of a plan, atomically, and without its comments, which hold the date."""
-    with tempfile.TemporaryDirectory() as folder:  # not beside the result: to netconvert a comma in a path separates two files
-        nodes, edges, net = (Path(folder) / name for name in ("town.nod.xml", "town.edg.xml", "town.net.xml"))
+    with temporary_folder() as folder:  # not beside the result: to netconvert a comma in a path separates two files
+        nodes, edges, net = (folder / name for name in ("town.nod.xml", "town.edg.xml", "town.net.xml"))
         options = (*CONVERT_OPTIONS, *(LEFT_HAND if spec.driving_side == "left" else ()))
         nodes.write_text(_nodes_xml(plan), encoding="utf-8")
         edges.write_text(_edges_xml(plan, spec), encoding="utf-8")

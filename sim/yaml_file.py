@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from hippodrome._files import read_bounded
 from hippodrome.core.types import HippodromeError
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 UNKNOWN_KEY = {"extra_forbidden", "unexpected_keyword_argument"}  # pydantic's names, of models and of dataclasses
 MAX_BYTES = 1 << 20  # a scenario is a page; more is a mistake or an attack
+MAX_NODES = 100_000  # values, aliases written out; a scenario has some 250 keys
+MOST_COUNTED = 1 << 62  # a bomb's size has as many digits as it has lines
+UNFINISHED = -1  # size of a node that is being counted
+MERGE = "tag:yaml.org,2002:merge"
 
 
 class ScenarioError(HippodromeError):
@@ -22,16 +27,7 @@ class ScenarioError(HippodromeError):
 
 def load_yaml(path: Path, model: type[ModelT]) -> ModelT:
     """The file as ``model``; nothing is repaired and unknown keys are refused. Raises ScenarioError."""
-    text = _read(path)
-    try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-        data = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f":{mark.line + 1}" if mark else ""
-        raise ScenarioError(f"{path}{line}: not valid YAML: {getattr(error, 'problem', None) or error}") from None
-    except RecursionError:
-        raise ScenarioError(f"{path}: nested too deeply") from None
+    root, data = parse_yaml(read_yaml(path), str(path))
     if not isinstance(data, dict):
         raise ScenarioError(f"{path}: a scenario is a mapping of keys to values; see scenarios/ for examples")
     try:
@@ -45,15 +41,90 @@ def load_yaml(path: Path, model: type[ModelT]) -> ModelT:
         ) from None
 
 
-def _read(path: Path) -> str:
+def read_yaml(path: Path) -> str:
+    """The text of a file that is no longer than a scenario may be. Raises ScenarioError."""
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise ScenarioError(f"{path}: {path.stat().st_size} bytes, a scenario has at most {MAX_BYTES}")
-        return path.read_text(encoding="utf-8")
+        return read_bounded(path, MAX_BYTES).decode("utf-8-sig")
     except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from None
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror or error}; a scenario is a file of at most 1 MiB") from None
     except UnicodeDecodeError:
         raise ScenarioError(f"{path}: not UTF-8 text, so not a scenario") from None
+
+
+def parse_yaml(text: str, place: str) -> tuple[yaml.Node | None, Any]:
+    """The nodes of a YAML text, which know their lines, and its values, whatever is in it.
+
+    Args:
+        text: The text; of no more than ``MAX_BYTES``, as YAML is slow to read.
+        place: What errors begin with: the file.
+
+    Raises:
+        ScenarioError: It is no YAML, has a value that cannot be made, or grows beyond bounds by its aliases and merge keys.
+    """
+    loader = yaml.SafeLoader("")
+    try:
+        loader = yaml.SafeLoader(text)
+        root = loader.get_single_node()
+        if root is None:
+            return None, None
+        if (size := _expanded_size(root, {})) > MAX_NODES:
+            raise ScenarioError(f"{place}: its aliases and merge keys make {size} values, the limit is {MAX_NODES}; write it out")
+        for scalar in _scalars(root, set()):
+            _require_value(loader, scalar, place)
+        return root, loader.construct_document(root)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f":{mark.line + 1}" if mark else ""
+        reason = " ".join(str(getattr(error, "problem", None) or error).split())
+        raise ScenarioError(f"{place}{line}: not valid YAML: {reason}") from None
+    except RecursionError:
+        raise ScenarioError(f"{place}: nested too deeply") from None
+    except (TypeError, ValueError, OverflowError) as error:  # a key that is a list, for one
+        raise ScenarioError(f"{place}: not valid YAML: {' '.join(str(error).split())[:200]}") from None
+    finally:
+        loader.dispose()
+
+
+def _expanded_size(node: yaml.Node, known: dict[int, int]) -> int:
+    """How many values a node stands for when each alias is written out. An alias of what it lies in is refused."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    if id(node) in known:
+        if known[id(node)] == UNFINISHED:
+            raise yaml.MarkedYAMLError(problem="an alias stands for what it is a part of", problem_mark=node.start_mark)
+        return known[id(node)]
+    known[id(node)] = UNFINISHED
+    children = [child for item in node.value for child in (item if isinstance(item, tuple) else (item,))]
+    known[id(node)] = size = min(1 + sum(_expanded_size(child, known) for child in children), MOST_COUNTED)
+    return size
+
+
+def _scalars(node: yaml.Node, seen: set[int]) -> Iterator[yaml.ScalarNode]:
+    """Each single value below a node, once."""
+    if id(node) in seen:
+        return
+    seen.add(id(node))
+    if isinstance(node, yaml.ScalarNode):
+        yield node
+    else:
+        for item in node.value:
+            for child in item if isinstance(item, tuple) else (item,):
+                yield from _scalars(child, seen)
+
+
+def _require_value(loader: yaml.SafeLoader, node: yaml.ScalarNode, place: str) -> None:
+    """Raise ScenarioError, with the line, if a value cannot be made of what is written: there is no 2001-99-99."""
+    if node.tag == MERGE:
+        return
+    try:
+        loader.construct_object(node)
+    except yaml.YAMLError:
+        raise
+    except Exception as error:  # PyYAML lets through whatever int(), float(), datetime() or a lookup make of it
+        kind = node.tag.rpartition(":")[2]
+        written = node.value if len(node.value) <= 40 else f"{node.value[:40]}... ({len(node.value)} characters)"
+        cause = f"'{written}' is no {kind} ({type(error).__name__}); quote it if it is meant as text"
+        raise ScenarioError(f"{place}:{node.start_mark.line + 1}: {cause}") from None
 
 
 def _reason(kind: str, message: str) -> str:

@@ -1,13 +1,14 @@
 """Files that are whole or absent, and hashes of files and of code. For all parts of the package; not public.
 
-This module lies beneath ``core``, ``sim``, ``proto`` and ``eval``, so that each of them may use it. It imports the standard
-library and ``HippodromeError``, nothing else.
+This module lies beneath ``core``, ``sim``, ``proto`` and ``eval``, as ``_folders`` and ``_processes`` do, so that each of them
+may use it. They import the standard library, one another and ``HippodromeError``, nothing else.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from hippodrome._folders import PART, lock_or_none, sweep_files
 from hippodrome.core.types import HippodromeError
 
 PACKAGE: Final = Path(__file__).parent  # the folder in which ``core``, ``sim``, ``proto`` and ``eval`` lie
@@ -25,21 +27,45 @@ def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary file beside ``path``, which takes that name only when the block ends without an error.
 
     By then its bytes are on disk; until then, and after an error, whatever was at ``path`` stays as it was. The folder is made
-    if need be. The finished file may be read by everybody.
+    if need be. The finished file may be read by whom the umask lets. What a killed process left of the same file is swept.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
+    sweep_files(path.parent, path.name)
+    handle, temporary = _held_file(path)
     try:
         yield temporary
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
-        temporary.chmod(0o644)  # a temporary file is private by default
+        temporary.chmod(allowed(0o666))  # a temporary file is private by default
         temporary.replace(path)
         _sync_folder(path.parent)
+    except OSError as error:
+        if error.errno is not None and error.filename is None:
+            error.filename = str(path)  # a full disk is met while writing, and does not know of which file
+        raise
     finally:
         temporary.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def _held_file(path: Path) -> tuple[int, Path]:
+    """A new file beside ``path``, and the handle whose lock says that somebody is writing it."""
+    while True:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=PART, dir=path.parent)
+        if lock_or_none(handle) is not False and Path(name).exists():  # else a sweeper took it before it was locked
+            return handle, Path(name)
+        os.close(handle)
+
+
+def allowed(mode: int) -> int:
+    """The permissions that the process's umask leaves of ``mode``."""
+    try:  # Linux tells the umask without its being set, which another thread would notice
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+        umask = int(next(line.split()[1] for line in lines if line.startswith("Umask:")), 8)
+    except (OSError, ValueError, StopIteration):
+        umask = os.umask(0o077)
+        os.umask(umask)
+    return mode & ~umask
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -49,6 +75,30 @@ def write_atomically(path: Path, data: bytes) -> None:
             temporary.write_bytes(data)
     except OSError as error:
         raise HippodromeError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def read_bounded(path: Path, most_bytes: int) -> bytes:
+    """The bytes of a file that somebody names. No more than ``most_bytes`` are read, whatever the file says of its size.
+
+    Raises:
+        OSError: It cannot be read, is larger, or is no regular file: a device never ends, and a named pipe waits for a writer.
+        HippodromeError: It has a name that no file can have.
+    """
+    try:
+        with open(path, "rb", opener=_open_without_waiting) as stream:
+            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                raise OSError("not a regular file")
+            data: bytes = stream.read(most_bytes + 1)
+    except ValueError as error:  # a null byte in the name
+        raise HippodromeError(f"{str(path)!r}: not the name of a file: {error}") from error
+    if len(data) > most_bytes:
+        raise OSError(f"more than {most_bytes} bytes, the limit")
+    return data
+
+
+def _open_without_waiting(name: str, flags: int) -> int:
+    """Open a file; a named pipe would block until somebody writes to it."""
+    return os.open(name, flags | os.O_NONBLOCK)
 
 
 def sha256_of(path: Path) -> str:

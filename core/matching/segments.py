@@ -35,7 +35,7 @@ def route_segments(route: Route, explained: BoolArray) -> list[RouteSegment]:
     jumped = np.abs(np.diff(route.log_scale, prepend=route.log_scale[0])) > _JUMP
     begins = np.diff(explained.astype(np.int8), prepend=0) != 0
     cuts = np.flatnonzero(begins | (jumped & explained))
-    ends = np.append(cuts[1:], len(explained))
+    ends = np.append(cuts[1:], len(explained))[: len(cuts)]  # a route that explains nothing has no cut and no end
     return [RouteSegment(int(first), int(end)) for first, end in zip(cuts, ends, strict=True) if explained[first]]
 
 

@@ -10,6 +10,8 @@ from hippodrome.core.refinement.route import RouteRefineConfig, refine_route
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, HippodromeError, Refinement, StartPose
 
+LEAST_VERTICES = 2  # one place has no direction
+
 
 @dataclass(frozen=True, slots=True)
 class RefineConfig:
@@ -38,11 +40,14 @@ def refine(
         vouched for, with the reason; and the parameters that were estimated on the way.
 
     Raises:
-        HippodromeError: the map is refined already, or mode ``paper`` got no start pose.
+        HippodromeError: the map is refined already or has no drive in it, or mode ``paper`` got no start pose.
     """
     config = config or RefineConfig()
     if cognitive_map.frame != "semi-metric":
         raise HippodromeError(f"cognitive map: its frame is {cognitive_map.frame!r}; only a semi-metric map can be refined")
+    if len(cognitive_map.t_s) < LEAST_VERTICES or not len(cognitive_map.visits.t_s):
+        found = f"{len(cognitive_map.t_s)} vertices and {len(cognitive_map.visits.t_s)} visits"
+        raise HippodromeError(f"cognitive map: {found} are no drive to be laid on roads; record a longer drive")
     if config.mode == "route":
         return refine_route(cognitive_map, network, config.route, start)
     if start is None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from hippodrome._folders import temporary_folder
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.errors import file_errors
 from hippodrome.eval.authoring.network_notes import network_notes
@@ -36,8 +36,8 @@ def check_scenario(path: Path) -> Finding:
         return Finding(path, errors, "", ())
     try:
         scenario = read_scenario(path)
-        with tempfile.TemporaryDirectory() as folder:
-            town = build_town(scenario.town, scenario.seed, Path(folder))
+        with temporary_folder() as folder:
+            town = build_town(scenario.town, scenario.seed, folder)
         graph = tour_graph(town.network)
         toured_area(graph, scenario.mapping.tour.planned_length_m())
     except HippodromeError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 import yaml
 
 from hippodrome._files import write_atomically
+from hippodrome._folders import temporary_folder
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.files.scenarios import PACKAGE, located
@@ -86,13 +86,13 @@ def new_scenario(name: str, source: str, path: Path, driving_side: Choice = "aut
     for target in filter(None, (path, network)):
         if target.exists():
             raise HippodromeError(f"{target}: exists already; choose another --out, or remove it first")
-    with tempfile.TemporaryDirectory() as folder:
-        imported = Path(folder) / network.name if network else None
+    with temporary_folder() as folder:
+        imported = folder / network.name if network else None
         imported_notes = import_map(Path(source), imported, driving_side) if imported else ()
-        town = _town(source, imported, Path(folder), driving_side)
+        town = _town(source, imported, folder, driving_side)
         draft = draft_for(town)
         text = scenario_text(name, source, path, draft, driving_side)
-        trial = Path(folder) / path.name
+        trial = folder / path.name
         trial.write_text(text, encoding="utf-8")
         scenario = _checked(trial, path)
         if network and imported:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from hippodrome.eval.authoring.keys import noise_keys, scenario_keys
 from hippodrome.sim.scenario import Scenario
-from hippodrome.sim.yaml_file import ScenarioError, load_yaml
+from hippodrome.sim.yaml_file import ScenarioError, load_yaml, parse_yaml, read_yaml
 
 UNKNOWN: Final = "extra_forbidden"  # pydantic's name for a key that the model does not have
 MODEL_TYPES: Final = ("model_type", "dataclass_type")  # pydantic's names for a plain value where a mapping is wanted
@@ -27,7 +27,7 @@ def file_errors(path: Path) -> tuple[str, ...]:
         first = error
         if not isinstance(error.__context__, ValidationError):  # unreadable, or no YAML: there is no second error to find
             return (str(error),)
-    root = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+    root, _ = parse_yaml(read_yaml(path), str(path))
     found = list(_repeated(root, (), set()))
     if first is not None and isinstance(first.__context__, ValidationError):
         found += _invalid(root, first.__context__)

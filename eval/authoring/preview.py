@@ -16,7 +16,6 @@ from hippodrome.sim.episode import Samples, draw_frame
 from hippodrome.sim.network import edge_lengths_m
 from hippodrome.sim.record import ROLES, RecordingPlan, Role, simulate
 from hippodrome.sim.render.probe import require_gl
-from hippodrome.sim.render.renderer import FrameRenderer
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.scene.build import build_scene
 from hippodrome.sim.types import Drive, Town
@@ -87,6 +86,8 @@ def mapped_share(network: RoadNetwork, mapping: Drive, second: Drive) -> float:
 def _stills(plans: dict[Role, RecordingPlan], town: Town, preview: Preview) -> tuple[list[Frame], list[str]]:
     """``STILLS`` frames of each drive, spread evenly over it, and their captions."""
     frames, captions = [], []
+    from hippodrome.sim.render.renderer import FrameRenderer  # after require_gl, which names what is missing
+
     for role, plan in plans.items():
         samples, conditions = preview.samples[role], plan.drive_spec.conditions
         numbers = np.linspace(0, len(samples.frame_steps) - 1, 2 * STILLS + 1).astype(int)[1::2]  # not where a drive begins

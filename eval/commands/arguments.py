@@ -14,7 +14,7 @@ from hippodrome.core.types import StartPose
 from hippodrome.sim.geo_start import GeoStart
 from hippodrome.sim.renamed import present_value
 
-DONE, THRESHOLD_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, THRESHOLD_FAILED, BAD_INPUT, OUR_FAULT, INTERRUPTED = 0, 1, 2, 70, 130
 
 Command: TypeAlias = Callable[[argparse.Namespace], int]  # takes the options and answers with the exit status
 
@@ -101,11 +101,25 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def add_out(parser: argparse.ArgumentParser, default: str) -> None:
-    """The folder of the results."""
+    """The folder of the results, in which the parser's command writes alone."""
+    write_alone(parser)
     parser.add_argument(
         "--out", type=Path, default=Path(default), metavar="DIR",
         help=f"folder for the results; what is finished in it is not made again (default: {default})",
     )  # fmt: skip
+
+
+def write_alone(parser: argparse.ArgumentParser) -> None:
+    """Let no two commands write in one folder ``--out``: the later one is refused with a sentence."""
+    run: Command = parser.get_default("command")
+
+    def alone(options: argparse.Namespace) -> int:
+        from hippodrome._folders import written_by_one
+
+        with written_by_one(options.out):
+            return run(options)
+
+    parser.set_defaults(command=alone)
 
 
 def positive(text: str) -> int:
@@ -113,6 +127,14 @@ def positive(text: str) -> int:
     value = int(text)
     if value < 1:
         raise argparse.ArgumentTypeError(f"{value} is less than 1")
+    return value
+
+
+def positive_number(text: str) -> float:
+    """A finite number above 0."""
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
     return value
 
 
@@ -131,7 +153,9 @@ def start_pose(text: str) -> StartPose | GeoStart:
     try:
         x_m, y_m, heading_deg = (float(part) for part in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is not X,Y,HEADING (metres, metres, degrees)") from None
+        x_m = y_m = heading_deg = math.nan
+    if not (math.isfinite(x_m) and math.isfinite(y_m) and math.isfinite(heading_deg)):
+        raise argparse.ArgumentTypeError(f"'{text}' is not X,Y,HEADING (metres, metres, degrees)")
     return StartPose(x_m, y_m, math.radians(heading_deg))
 
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, add_command, start_pose
+from hippodrome.eval.commands.arguments import DONE, add_command, start_pose, write_alone
 from hippodrome.eval.commands.exchange import add_drive_options, add_exchange_commands, import_command
 
 
@@ -40,6 +40,7 @@ def add_drive_command(commands: Any) -> None:
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="folder for the results; what is finished in it is not made again"
     )
+    write_alone(parser)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -39,7 +39,8 @@ def add_sweep_command(commands: Any) -> None:
     add_workers(parser)
     parser.add_argument(
         "--scheduler", metavar="ADDRESS",
-        help="run on the Dask cluster with this scheduler, for instance tcp://host:8786; needs pip install 'hippodrome[dask]' "
+        help="run on the Dask cluster with this scheduler, for instance tcp://127.0.0.1:8786 (docs/sweeps.md: TLS for several "
+             "machines); needs pip install 'hippodrome[dask]' "
              "(default: run on this machine)",
     )  # fmt: skip
     add_out(parser, "out/sweep")

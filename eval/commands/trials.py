@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, add_command, add_out, add_workers, localizer_mode, positive, seed
+from hippodrome.eval.commands.arguments import (
+    DONE,
+    add_command,
+    add_out,
+    add_workers,
+    localizer_mode,
+    positive,
+    positive_number,
+    seed,
+)
 
 # Names for --help, which does not wait for the parts that they come from: the tests hold them together.
 MODES = ("coupled", "kalman", "lanes", "paper")  # those of ``core.localization.config.Mode``
@@ -105,7 +114,7 @@ def add_trial_commands(commands: Any) -> None:
         help="runs of ORB-SLAM3, whose results vary; one more begins if one crashes (default: 3)",
     )  # fmt: skip
     baselines.add_argument(
-        "--seconds", type=float, metavar="S",
+        "--seconds", type=positive_number, metavar="S",
         help="a quick look: run ORB-SLAM3 only, on the first S seconds of the mapping drive (default: everything, on the whole "
              "drives)",
     )  # fmt: skip

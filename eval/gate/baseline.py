@@ -9,9 +9,10 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from hippodrome._files import write_atomically
+from hippodrome._files import read_bounded, write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.results.model import (
+    MAX_BYTES,
     ErrorSummary,
     Results,
     Row,
@@ -76,7 +77,7 @@ def write_baseline(path: Path, baseline: Baseline) -> None:
 def read_baseline(path: Path) -> Baseline:
     """Read and validate. Raises GateError."""
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_bounded(path, MAX_BYTES).decode("utf-8"))
         if isinstance(data, dict) and data.get("format") != FORMAT:
             raise GateError(
                 f"{path}: baseline format {data.get('format')}, this version reads {FORMAT}; refresh it with --update"
@@ -84,12 +85,12 @@ def read_baseline(path: Path) -> Baseline:
         return Baseline.model_validate(data)
     except FileNotFoundError:
         raise GateError(f"{path}: no baseline there; make one with `hippodrome gate --update`") from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise GateError(f"{path}: not a readable baseline: {error}") from error
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise GateError(f"{path}: {place or 'top level'}: {first['msg']}") from error
+    except (OSError, ValueError, RecursionError) as error:  # ValueError: no JSON, no UTF-8, or a number of thousands of digits
+        raise GateError(f"{path}: not a readable baseline: {error}") from error
 
 
 def question_of(result: ScenarioResult) -> str:

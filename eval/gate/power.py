@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from hippodrome.eval.gate.baseline import Baseline, BaselineRow, Figure
+from hippodrome.eval.gate.baseline import Baseline, BaselineRow, GateError
 from hippodrome.eval.gate.compare import compare
+from hippodrome.eval.gate.plants import OUTCOMES, FigureChange, outcomes, shake, shuffled, single_town, uneven
 
 REPEATS: Final = 100  # repeats of each trial: its share of failed builds is then known to 5 %
 PLANTED: Final = (0.0, 0.05, 0.10, 0.20, 0.50)  # share by which the error is made worse
 # Standard deviation of ln(error) from one harmless change to another: none, another processor's rounding, a reordered search.
 SHAKEN: Final = (0.0, 0.01, 0.03, 0.10)
 TARGET: Final = "APE mean (m)"  # the figure that is made worse
-FigureChange: TypeAlias = Callable[[BaselineRow, str, float], float]  # new value of a row's figure, from its name and value
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,13 +39,13 @@ def power_of(baseline: Baseline, method: str, repeats: int = REPEATS) -> list[Tr
     ]
 
 
-def shake(baseline: Baseline, change: FigureChange) -> Baseline:
-    """The baseline with each figure of each row replaced by what ``change`` answers to it."""
-    return Baseline(cells=tuple(cell.model_copy(update={"figures": _changed(cell, change)}) for cell in baseline.cells))
-
-
 def print_power(baseline: Baseline, method: str, console: Console) -> None:
-    """A table: noise down, planted regression across, share of builds that fail inside."""
+    """Two tables: regressions that are even over the pairs, by their size and the noise; and others, by their kind.
+
+    Raises GateError if the baseline has no such method.
+    """
+    if method not in (methods := {cell.method for cell in baseline.cells}):
+        raise GateError(f"the baseline has no method '{method}'; it has: {', '.join(sorted(methods)) or 'none'}")
     trials = {(trial.shaken, trial.planted): trial.failed for trial in power_of(baseline, method)}
     pairs = sum(cell.method == method for cell in baseline.cells)
     table = Table(title=f"share of builds that fail; {method}, {pairs} pairs", title_justify="left", box=box.SIMPLE_HEAD)
@@ -56,6 +55,17 @@ def print_power(baseline: Baseline, method: str, console: Console) -> None:
     for shaken in SHAKEN:
         table.add_row(f"{shaken:.0%}", *(f"{trials[shaken, planted]:.0%}" for planted in PLANTED))
     console.print(table)
+    console.print(_uneven_table(baseline, method))
+
+
+def _uneven_table(baseline: Baseline, method: str) -> Table:
+    table = Table(title="changes of the APE that are not even over the pairs", title_justify="left", box=box.SIMPLE_HEAD)
+    for head in ("planted", *OUTCOMES):
+        table.add_column(head, justify="left" if head == "planted" else "right")
+    for plant in (uneven(0.10), uneven(0.20), uneven(0.50), single_town(0.25), single_town(0.50), shuffled()):
+        found = outcomes(baseline, method, plant, range(REPEATS), (TARGET,))
+        table.add_row(plant.words, *(f"{found[outcome] / REPEATS:.0%}" for outcome in OUTCOMES))
+    return table
 
 
 def _failed_share(baseline: Baseline, method: str, planted: float, shaken: float, repeats: int) -> float:
@@ -65,7 +75,7 @@ def _failed_share(baseline: Baseline, method: str, planted: float, shaken: float
     failed = 0
     for repeat in range(repeats):
         rng = np.random.default_rng([repeat, round(1e3 * shaken)])
-        failed += not compare(shake(baseline, _regression(rng, method, planted, shaken)), baseline).passed
+        failed += compare(shake(baseline, _regression(rng, method, planted, shaken)), baseline).failed
     return failed / repeats
 
 
@@ -77,7 +87,3 @@ def _regression(rng: np.random.Generator, method: str, planted: float, shaken: f
         return float(value * factor * np.exp(shaken * rng.standard_normal()))
 
     return change
-
-
-def _changed(cell: BaselineRow, change: FigureChange) -> dict[str, Figure]:
-    return {name: figure.model_copy(update={"value": change(cell, name, figure.value)}) for name, figure in cell.figures.items()}

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-from rich.console import Console
+from typing import IO
 
 from hippodrome._files import write_atomically
 from hippodrome.eval.gate.baseline import Baseline, GateError, baseline_of, read_baseline, write_baseline
-from hippodrome.eval.gate.compare import MIN_PAIRS, Verdict, compare
-from hippodrome.eval.gate.report import junit_xml, print_verdict, summary_markdown
+from hippodrome.eval.gate.compare import Verdict, compare
+from hippodrome.eval.gate.report import junit_xml, outcome_of, print_verdict, summary_markdown
+from hippodrome.eval.gate.statistics import MIN_PAIRS
 from hippodrome.eval.results.model import Results
+from hippodrome.eval.results.terminal import PlainConsole
 from hippodrome.eval.results.thresholds import failed_limits
 from hippodrome.eval.run import load_scenarios, run_scenarios
 from hippodrome.sim.scenario import Thresholds
@@ -32,12 +34,14 @@ class GateRequest:
     workers: int
     out: Path
     junit: Path | None  # where the verdict goes as JUnit XML too
+    town_limit: float | None = None  # share by which no figure may become worse in a single town
 
 
-def gate(request: GateRequest) -> bool:
-    """Run the scenarios with all seeds; whether the run is as good as the baseline and within all limits.
+def gate(request: GateRequest) -> str:
+    """Run the scenarios with all seeds, and compare: ``passed``, ``failed`` or ``cannot tell``.
 
-    With ``update`` the run becomes the baseline, and passes. Raises HippodromeError on bad input.
+    With ``update`` the run becomes the baseline, and passes. Raises HippodromeError on bad input, and before the minutes that a
+    run takes if a file that is to be written at its end cannot be.
     """
     if not request.scenarios:
         raise GateError("no scenario: name one or more files")
@@ -46,15 +50,45 @@ def gate(request: GateRequest) -> bool:
             f"{len(request.scenarios)} scenario(s) with {len(request.seeds)} seed(s): a test needs {MIN_PAIRS} pairs; "
             "give more seeds"
         )
-    known = None if request.update else read_baseline(request.baseline)  # before the minutes that a run takes
+    known = None if request.update else read_baseline(request.baseline)
+    _require_writable(request)
     runs = [_run(request, seed) for seed in request.seeds]
     found, limits = baseline_of(runs), broken_limits(runs)
     if known is not None:
-        return say(compare(found, known), limits, request.junit)
+        return say(compare(found, known, request.town_limit), limits, request.junit)
     _show_update(found, request.baseline, limits)
     write_baseline(request.baseline, found)
     print(f"{request.baseline}: written, {len(found.cells)} cells; commit it")
-    return True
+    return "passed"
+
+
+def _require_writable(request: GateRequest) -> None:
+    """Raise GateError unless the files that the end of the run writes can be written."""
+    if request.update:
+        require_writable(request.baseline, "the baseline")
+    if request.junit is not None:
+        require_writable(request.junit, "--junit")
+    if summary := os.environ.get(SUMMARY):
+        _open_summary(Path(summary)).close()
+
+
+def require_writable(path: Path, what: str) -> None:
+    """Raise GateError unless ``path`` can become a file: a file may be made beside it, and it is no folder and no device."""
+    if path.exists() and not path.is_file():
+        raise GateError(f"{path}: {what} is to be written there, which is no regular file; name another")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent) as trial:
+            trial.write(b"trial")
+    except OSError as error:
+        raise GateError(f"{path}: {what} cannot be written there: {error.strerror or error}; name another file") from error
+
+
+def _open_summary(path: Path) -> IO[str]:
+    try:
+        return path.open("a", encoding="utf-8")
+    except OSError as error:
+        raise GateError(f"{path}: the step summary cannot be written: {error.strerror or error}; unset {SUMMARY}") from error
 
 
 def _show_update(found: Baseline, path: Path, limits: Sequence[str]) -> None:
@@ -63,20 +97,23 @@ def _show_update(found: Baseline, path: Path, limits: Sequence[str]) -> None:
         print(f"limit, fails the gate with any baseline: {line}")
     if path.exists():
         try:
-            print_verdict(compare(found, read_baseline(path)), (), Console())
+            print_verdict(compare(found, read_baseline(path)), (), PlainConsole())
         except GateError as error:
             print(f"not comparable with the old baseline: {error}")
 
 
-def say(verdict: Verdict, limits: Sequence[str], junit: Path | None) -> bool:
-    """Tell the terminal, the CI system and GitHub; whether the gate is passed."""
-    print_verdict(verdict, limits, Console())
+def say(verdict: Verdict, limits: Sequence[str], junit: Path | None) -> str:
+    """Tell the terminal, the CI system and GitHub; ``passed``, ``failed`` or ``cannot tell``."""
+    print_verdict(verdict, limits, PlainConsole())
     if junit is not None:
         write_atomically(junit, junit_xml(verdict, limits))
     if summary := os.environ.get(SUMMARY):
-        with Path(summary).open("a", encoding="utf-8") as stream:
-            stream.write(summary_markdown(verdict, limits))
-    return verdict.passed and not limits
+        try:
+            with _open_summary(Path(summary)) as stream:
+                stream.write(summary_markdown(verdict, limits))
+        except OSError as error:
+            raise GateError(f"{summary}: the step summary cannot be written: {error.strerror or error}") from error
+    return outcome_of(verdict, limits)
 
 
 def broken_limits(runs: Sequence[Results]) -> list[str]:

@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hippodrome.eval.gate.baseline import baseline_of
-from hippodrome.eval.gate.compare import lost_cells, require_comparable
-from hippodrome.eval.gate.report import MOVED
+from hippodrome.eval.gate.compare import MOVED, lost_cells, require_comparable
 from hippodrome.eval.results.model import Results, read_results
 
 

@@ -6,13 +6,12 @@ very small town, with noise for camera frames, calls every compiled function onc
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
+from hippodrome._folders import temporary_folder
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
 from hippodrome.core.mapping.mapper import Mapper, MapperConfig
 from hippodrome.core.refinement.refine import RefineConfig, refine
@@ -32,8 +31,8 @@ RATE_HZ = 5.0  # of observations
 @cache
 def warm_up() -> None:
     """Run the whole chain on a small drive, once per process."""
-    with tempfile.TemporaryDirectory() as folder:
-        town = build_town(TOWN, 1, Path(folder))
+    with temporary_folder() as folder:
+        town = build_town(TOWN, 1, folder)
         drive = simulate_drive(town, TourSpec(length_m=700.0), TrafficSpec(vehicles=0), EgoSpec(), 1)
     start = StartPose(*(float(value) for value in drive.poses_m[0]))
     motion = sense_self_motion(drive, RATE_HZ, NOISE_LEVELS["paper"], np.random.default_rng(1))

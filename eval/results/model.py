@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from hippodrome._files import write_atomically
+from hippodrome._files import read_bounded, write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.metrics.localization import LocalizationScore
 from hippodrome.eval.metrics.trajectory import Score
@@ -137,15 +137,13 @@ def write_results(path: Path, results: Results) -> None:
 def read_results(path: Path) -> Results:
     """Read and validate ``results.json``. Raises ResultsError, which names the file, the field and the reason."""
     try:
-        if (size := path.stat().st_size) > MAX_BYTES:
-            raise ResultsError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
-        return Results.model_validate(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise ResultsError(f"{path}: not a readable results file: {error}") from error
+        return Results.model_validate(json.loads(read_bounded(path, MAX_BYTES).decode("utf-8")))
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise ResultsError(f"{path}: {place or 'top level'}: {first['msg']}") from error
+    except (OSError, ValueError, RecursionError) as error:  # ValueError: no JSON, no UTF-8, or a number of thousands of digits
+        raise ResultsError(f"{path}: not a readable results file: {error}") from error
 
 
 def without_timings(results: Results) -> dict[str, Any]:

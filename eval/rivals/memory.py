@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from hippodrome._processes import dying_with_me
 from hippodrome.eval.methods.materials import Materials, gather, refine_config, true_start
 from hippodrome.eval.methods.method import NO_ATTRACTOR, RATSLAM, REFINED, SEMI_METRIC, Method
 from hippodrome.eval.pool import Workers
@@ -41,7 +42,9 @@ def with_peak_rss(results: Results, scenario: Scenario, out: Path, pool: Workers
 def peak_rss_bytes(task: MemoryTask) -> int | None:
     """The most memory that a fresh process holds while it runs the method; None if it failed, as its row says already."""
     materials = gather(task.scenario, task.out)
-    with subprocess.Popen(COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, preexec_fn=dying_with_me()
+    ) as process:
         assert process.stdin is not None
         assert process.stdout is not None
         with contextlib.suppress(BrokenPipeError), process.stdin as pipe:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -129,6 +131,13 @@ def dask_cluster(address: str) -> Callable[[int | None], AbstractContextManager[
     except ModuleNotFoundError:
         raise SweepError("the package 'distributed' is missing; install the extra: pip install 'hippodrome[dask]'") from None
 
+    if not is_guarded(address):
+        print(
+            f"hippodrome: --scheduler {address}: neither on this machine nor encrypted; who reaches it runs code there and here; "
+            "see docs/sweeps.md for TLS",
+            file=sys.stderr,
+        )
+
     @contextmanager
     def connected(_: int | None) -> Iterator[Executor]:
         try:
@@ -139,6 +148,13 @@ def dask_cluster(address: str) -> Callable[[int | None], AbstractContextManager[
             yield executor
 
     return connected
+
+
+def is_guarded(address: str) -> bool:
+    """Whether a scheduler's address is this machine's own, one within this process, or encrypted."""
+    kind, _, place = address.rpartition("://")
+    host = place.rpartition(":")[0].strip("[]") or place
+    return kind in ("tls", "wss", "inproc") or host in ("localhost", "::1") or re.fullmatch(r"127(\.\d+){3}", host) is not None
 
 
 def _guarded(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT | Failure:

@@ -10,7 +10,6 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
 from hippodrome.eval.files.scenarios import read_scenario
@@ -19,6 +18,7 @@ from hippodrome.eval.sweep.executors import SweepError
 from hippodrome.sim.renamed import present_key
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS
+from hippodrome.sim.yaml_file import ScenarioError, parse_yaml
 
 MAX_CELLS = 100_000  # more is taken for a slip of the keyboard
 
@@ -58,8 +58,8 @@ def parse_parameter(text: str) -> Parameter:
     """The parameter of ``KEY=V1,V2``, values as YAML. Raises ValueError if the text is not of that form."""
     key, equals, values = text.partition("=")
     try:
-        found = yaml.safe_load(f"[{values}]")
-    except yaml.YAMLError:
+        _, found = parse_yaml(f"[{values}]", text[:80])
+    except ScenarioError:
         found = None
     if not equals or not all(part.isidentifier() for part in key.split(".")) or not isinstance(found, list) or not found:
         raise ValueError(f"'{text}' is not KEY=VALUE,VALUE like noise=paper,harsh or mapping.traffic.vehicles=0,8")

@@ -14,6 +14,7 @@ import sys
 from functools import cache
 from typing import Final
 
+from hippodrome._processes import dying_with_me
 from hippodrome.core.types import HippodromeError
 
 # Debian and Ubuntu names of what PyOpenGL's EGL platform loads, and of Mesa's software rasteriser behind it.
@@ -42,7 +43,9 @@ def probe() -> tuple[bool, str]:
     """Whether a frame can be drawn, tried in a process of its own, and one line: the driver, or what is missing."""
     command = [sys.executable, "-m", "hippodrome.sim.render.probe", "--draw"]
     try:
-        child = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+        child = subprocess.run(
+            command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False, preexec_fn=dying_with_me()
+        )
     except subprocess.TimeoutExpired:
         return False, f"OpenGL does not answer within {TIMEOUT_S:.0f} s; check the graphics driver"
     answer = [line.removeprefix(DRAWN) for line in child.stdout.splitlines() if line.startswith(DRAWN)]

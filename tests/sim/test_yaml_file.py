@@ -53,5 +53,5 @@ def test_a_missing_and_a_huge_file_are_refused(tmp_path):
     with pytest.raises(ScenarioError, match="cannot be read"):
         load_yaml(tmp_path / "none.yaml", Outer)
     (tmp_path / "huge.yaml").write_bytes(b"#" * (2 << 20))
-    with pytest.raises(ScenarioError, match="at most"):
+    with pytest.raises(ScenarioError, match="at most 1 MiB"):
         load_yaml(tmp_path / "huge.yaml", Outer)

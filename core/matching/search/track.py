@@ -13,6 +13,8 @@ from hippodrome.core.types import FloatArray, HippodromeError, Visits
 WANDER = 1.5  # factor by which the scale may leave its usual value for a while, as after a restart of visual odometry
 CALIBRATION = 0.1  # a metric odometry is off by less: tyres and stereo baselines by 1-3 %, and some more in a bend
 WIDE_SCALES = (0.1, 1.0, 10.0)  # metres per map unit tried when the visits carry no usable time
+MOST_DRIVEN_M = 2e6  # two days at the wheel; a longer drive comes of a motion that is none, and asks for hundreds of gigabytes
+_LEAST_ARC, _LARGEST_ARC = 1e-6, 1e12  # map units of a whole drive, in units from kilometres down to micrometres
 _BRISK_PERCENTILE = 90.0  # brisk speed of a drive among its speeds while moving: stops and jams do not lower it much
 _BRISK_SHARES = (0.25, 1.3)  # least and largest brisk speed of a drive, as shares of the network's speed limits
 
@@ -44,6 +46,15 @@ def make_track(visits: Visits, step: float) -> Track:
     return Track(arc, np.interp(arc, visit_arc[last_of_stop], heading[last_of_stop]), visit_arc, step)
 
 
+def _require_drivable(length_m: float) -> None:
+    """Raise HippodromeError unless a drive is one that a vehicle makes: a motion that is none would take all memory."""
+    if not length_m <= MOST_DRIVEN_M:
+        raise HippodromeError(
+            f"cognitive map: by its motions the drive is {length_m / 1e3:.3g} km long, the limit is {MOST_DRIVEN_M / 1e3:.0f}; "
+            "a motion between two visits is none; check the odometry and map the drive anew"
+        )
+
+
 def driven_arc(visits: Visits) -> FloatArray:
     """Arc length (S,) driven up to each visit, in map units.
 
@@ -64,17 +75,21 @@ def scale_range(visits: Visits, network: RoadNetwork) -> tuple[float, float, flo
     """Least, typical and largest possible metres per map unit, from the drive's brisk speed and the network's speed limits.
 
     Raises:
-        HippodromeError: the vehicle never moved.
+        HippodromeError: the vehicle never moved, or moved too little or too far for numbers to tell.
     """
     seconds, units = np.diff(visits.t_s), np.diff(driven_arc(visits))
     moving = (seconds > 0.0) & (units > 0.0)
     if not np.any(units > 0.0):
         raise HippodromeError("cognitive map: the vehicle never moved, so there is no route to match; record a longer drive")
+    if not _LEAST_ARC < (driven := float(np.sum(units))) < _LARGEST_ARC:
+        raise HippodromeError(f"cognitive map: a drive of {driven:.3g} map units in all is none; map the drive anew")
     if not np.any(moving):
+        _require_drivable(driven * WIDE_SCALES[1])
         return WIDE_SCALES
     speed = units[moving] / seconds[moving]
     brisk = float(np.percentile(speed, _BRISK_PERCENTILE))
     limit = network.speed_limit_mps[~network.is_internal]
     usual = float(np.median(limit))
     least, largest = _BRISK_SHARES
+    _require_drivable(driven * usual / brisk)
     return least / WANDER * usual / brisk, usual / brisk, largest * WANDER * float(np.max(limit)) / brisk

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from hippodrome._files import allowed
+from hippodrome._folders import unfinished_folder
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 
 
@@ -18,14 +18,9 @@ def new_folder(out: Path) -> Iterator[Path]:
         raise ExchangeError(f"{out}: exists already; remove it or choose another --out")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        building = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".part", dir=out.parent))
-    except OSError as error:
-        raise ExchangeError(f"{out}: cannot be written: {error.strerror}") from None
-    try:
-        yield building
-        building.chmod(0o755)
-        building.replace(out)
+        with unfinished_folder(out) as building:
+            yield building
+            building.chmod(allowed(0o777))
+            building.replace(out)
     except OSError as error:
         raise ExchangeError(f"{out}: cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(building, ignore_errors=True)

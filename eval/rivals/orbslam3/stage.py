@@ -10,7 +10,7 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.eval.pool import Workers, process_pool
 from hippodrome.eval.results.model import Row
 from hippodrome.eval.results.table_two import LocalizedSequence, SequenceRow, failed_sequence
-from hippodrome.eval.rivals.orbslam3.environment import NotInstalled, ensure_environment
+from hippodrome.eval.rivals.orbslam3.environment import NotInstalled, ensure_environment, environment_folder
 from hippodrome.eval.rivals.orbslam3.pairs import (
     StereoDrive,
     draw_pairs,
@@ -77,12 +77,12 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
 
     Args:
         scenario: Whose drive; its camera is replaced by a stereo camera.
-        out: Folder below which recordings, runs and the tracker's environment live. What is finished there is read back.
+        out: Folder below which recordings and runs live. What is finished there is read back.
         options: How to run it.
         pool: Processes that draw the stereo pairs, and the progress display.
     """
     try:
-        python = ensure_environment(out / "venv")
+        python = ensure_environment(environment_folder())
     except NotInstalled as error:
         return Tracked(failed_rows(f"not run: {error}"))
     drive, vocabulary = _prepared(scenario, out, options.seconds, pool)

@@ -20,6 +20,7 @@ from typing import IO
 import numpy as np
 
 from hippodrome._files import write_atomically
+from hippodrome._processes import dying_with_me
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
 from hippodrome.eval.rivals.orbslam3.pairs import StereoDrive
 from hippodrome.eval.rivals.orbslam3.poses import read_camera_tum
@@ -154,7 +155,14 @@ def _execute(task: RunTask) -> str | None:
     log_path = task.folder / "log.txt"
     with log_path.open("wb") as log:
         try:
-            process = subprocess.Popen(command, cwd=task.folder, stdin=subprocess.PIPE, stdout=log, stderr=subprocess.STDOUT)
+            process = subprocess.Popen(
+                command,
+                cwd=task.folder,
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                preexec_fn=dying_with_me(),
+            )
         except OSError as error:
             return f"cannot be started: {error}"
         feeder = threading.Thread(target=_feed, args=(process.stdin, task.drive), daemon=True)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
-
 from hippodrome._files import write_atomically
 from hippodrome.eval.methods.materials import gather
 from hippodrome.eval.pool import Workers, worker_pool
@@ -16,6 +14,7 @@ from hippodrome.eval.results.paper_rows import quoted_rows
 from hippodrome.eval.results.ratios import RATIOS, ratio_lines, ratios
 from hippodrome.eval.results.table_two import LocalizedSequence, write_table_two
 from hippodrome.eval.results.tables import failed_runs, print_table_one, table_one_markdown
+from hippodrome.eval.results.terminal import PlainConsole
 from hippodrome.eval.rivals.memory import with_peak_rss
 from hippodrome.eval.rivals.orbslam3.stage import Tracked, TrackerOptions, locate, track
 from hippodrome.eval.rivals.sequences import localize_sequences
@@ -75,7 +74,7 @@ def _complete(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) ->
     draw_comparison(materials, tracked)
     draw_sequences(materials, found)
     write_report(out)
-    print_table_one(results, quoted_rows(), Console())
+    print_table_one(results, quoted_rows(), PlainConsole())
     print("\n".join(ratio_lines(compared)))
     print(f"tables:  {out / 'table1.md'} {out / 'table2.md'}\nfigures: {out / scenario.name}/*.png\nreport:  {out / REPORT}")
 

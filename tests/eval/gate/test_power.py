@@ -13,7 +13,8 @@ import pytest
 
 from hippodrome.eval.commands.gate import SEEDS
 from hippodrome.eval.gate.baseline import Baseline, BaselineRow, Figure, read_baseline
-from hippodrome.eval.gate.compare import ALPHA, REPEATABILITY, compare
+from hippodrome.eval.gate.compare import compare
+from hippodrome.eval.gate.statistics import ALPHA, REPEATABILITY
 
 SAMPLES = json.loads((Path(__file__).parent / "gate_samples.json").read_text(encoding="utf-8"))
 REPEATS, DRIVES = SAMPLES["repeats"], SAMPLES["drives"]

@@ -1,0 +1,102 @@
+"""Processes that end with the one that started them, and signals that end a command as an interrupt does. Not public.
+
+A worker that outlives its command holds a gigabyte for ever, and a tool that does may write into a folder that the next command
+uses. Linux tells a process when its parent has died; elsewhere nothing does, and a child notices at its next look only.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import multiprocessing
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import connection
+from types import FrameType
+from typing import Final, NoReturn
+
+PR_SET_PDEATHSIG: Final = 1  # of Linux's <sys/prctl.h>
+# What a shell, a CI system or a batch system ends a command with. SIGINT is Python's own affair.
+ENDING: Final = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+GRACE_S: Final = 3.0  # time that workers have to clear away what they have begun
+
+
+class Terminated(KeyboardInterrupt):
+    """A signal other than the keyboard's asks the command to end; all that an interrupt does happens then."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.number = number
+
+
+def _prctl() -> Callable[..., int] | None:
+    """The system call that sets what a process gets when its parent dies; None where there is none."""
+    if sys.platform != "linux":
+        return None
+    with suppress(OSError, AttributeError):
+        found: Callable[..., int] = ctypes.CDLL(None, use_errno=True).prctl
+        return found
+    return None
+
+
+_PRCTL: Final = _prctl()  # looked up once: between fork and exec nothing may be loaded
+
+
+def die_with_parent(parent: int) -> None:
+    """Let the kernel kill this process when its parent ends, however that ends; at once if it has ended already.
+
+    Args:
+        parent: Process number of the parent.
+    """
+    if _PRCTL is not None:
+        _PRCTL(PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(128 + signal.SIGKILL)
+
+
+def dying_with_me() -> Callable[[], None]:
+    """For ``preexec_fn`` of ``subprocess``: the program dies with this process.
+
+    The kernel counts the thread that starts the program as its parent, so that thread has to wait for it.
+    """
+    return functools.partial(die_with_parent, os.getpid())
+
+
+@contextmanager
+def ending_like_an_interrupt() -> Iterator[None]:
+    """Within the block the signals of ``ENDING`` raise ``Terminated``; a second one ends the process as it always did.
+
+    Signals that are ignored, as ``nohup`` asks for, stay so. Only the main thread can have it otherwise.
+    """
+    kept = {}
+    with suppress(ValueError):  # not the main thread
+        for number in ENDING:
+            if signal.getsignal(number) == signal.SIG_DFL:
+                kept[number] = signal.signal(number, _raise_terminated)
+    try:
+        yield
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+
+
+def end_children(grace_s: float = GRACE_S) -> None:
+    """End the processes that ``multiprocessing`` started: they are asked first, and killed after ``grace_s``."""
+    children = multiprocessing.active_children()
+    for child in children:
+        child.terminate()
+    waiting, end_s = list(children), time.monotonic() + grace_s
+    while waiting and (left_s := end_s - time.monotonic()) > 0.0:
+        gone = connection.wait([child.sentinel for child in waiting], left_s)  # reaps none: their pool does that
+        waiting = [child for child in waiting if child.sentinel not in gone]
+    for child in waiting:
+        child.kill()
+
+
+def _raise_terminated(number: int, _frame: FrameType | None) -> NoReturn:
+    signal.signal(number, signal.SIG_DFL)
+    raise Terminated(number)

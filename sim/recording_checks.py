@@ -1,0 +1,75 @@
+"""What is checked of a recording's arrays and images before they are believed, or take memory."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from typing import Any, Final
+
+import cv2
+import numpy as np
+
+from hippodrome.core.types import Frame
+
+MAX_FRAME_BYTES: Final = 64 << 20  # of one image in its file; 12 megapixels of noise take 36 MB
+MAX_PIXELS: Final = 64_000_000  # of one image: some bytes can claim any size
+PNG_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
+PNG_HEAD: Final = struct.Struct(">8s4x4sII")  # signature, length and name of the first chunk, width, height
+# Largest absolute values of what a drive is made of. Speeds are in map units, whose length is unknown: from millimetres up.
+MOST: Final = {
+    "t_s": 1e11, "dt_s": 3600.0, "speed": 1e6, "yaw_rate_radps": 1e4, "poses_m": 1e9, "speed_mps": 1e4, "lane_position_m": 1e7,
+}  # fmt: skip
+TRUTH: Final = ("poses_m", "speed_mps", "lane_position_m")  # nan where it is unknown
+
+
+def check_samples(arrays: Mapping[str, np.ndarray[Any, Any]], most_steps: int) -> None:
+    """Raise ValueError, with the array and the row, unless the arrays of a sample file make a drive."""
+    if arrays["t_s"].ndim != 1:
+        raise ValueError("t_s is no list of times")
+    count = len(arrays["t_s"])
+    if not 0 < count <= most_steps:
+        raise ValueError(f"{count} steps, it may be 1 to {most_steps}")
+    for name, array in arrays.items():
+        if name == "lane_ids":
+            if array.ndim != 1 or (array.dtype.kind not in "US" and array.size):
+                raise ValueError("lane_ids is no list of names")
+            continue
+        shape = (count, 3) if name == "poses_m" else (count,)
+        if array.shape != shape or array.dtype.kind not in ("f" if name in MOST else "iu"):
+            raise ValueError(f"{name} is {array.dtype} {array.shape}, a recording of {count} steps has {shape}")
+    for name, most in MOST.items():
+        unknown = np.isnan(arrays[name]) if name in TRUTH else False
+        _require((np.abs(arrays[name]) <= most) | unknown, name, f"not finite, or beyond {most:g}")
+    _require(arrays["dt_s"] > 0.0, "dt_s", "not above zero")
+    _require(np.diff(arrays["t_s"]) > 0.0, "t_s", "followed by an earlier or the same one")
+    lanes = len(arrays["lane_ids"])
+    _require((arrays["lane"] >= -1) & (arrays["lane"] < max(lanes, 1)), "lane", f"none of {lanes} lanes")
+    numbers = arrays["frame"]
+    if not np.array_equal(numbers[numbers >= 0], np.arange(np.count_nonzero(numbers >= 0))):
+        raise ValueError("frame does not count the frames from 0 up")
+
+
+def decoded_png(blob: bytes) -> Frame:
+    """The RGB image (H, W, 3) of a PNG file. Raises ValueError if it is none, or claims to be larger than any camera's."""
+    if len(blob) > MAX_FRAME_BYTES:
+        raise ValueError(f"{len(blob)} bytes, the limit is {MAX_FRAME_BYTES}")
+    if len(blob) < PNG_HEAD.size:
+        raise ValueError("not a PNG image")
+    signature, chunk, width, height = PNG_HEAD.unpack_from(blob)
+    if signature != PNG_SIGNATURE or chunk != b"IHDR":
+        raise ValueError("not a PNG image")
+    if not 0 < width * height <= MAX_PIXELS:
+        raise ValueError(f"{width} x {height} pixels, the limit is {MAX_PIXELS} in all")
+    try:
+        image = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error as error:
+        raise ValueError(f"not a PNG image ({' '.join(str(error).split())[:100]})") from None
+    if image is None:
+        raise ValueError("not a whole PNG image")
+    return np.ascontiguousarray(image[:, :, ::-1], dtype=np.uint8)
+
+
+def _require(holds: np.ndarray[Any, Any], name: str, complaint: str) -> None:
+    if not holds.all():
+        row = int(np.argwhere(~holds)[0][0])
+        raise ValueError(f"{name}[{row}] is {complaint}")

@@ -101,7 +101,7 @@ def read_georeference(net_file: Path) -> GeoReference:
 
 
 def is_georeferenced(net_file: Path) -> bool:
-    """Whether a SUMO network says where on Earth it lies, as maps of real roads do. It is not asked whether its projection is known.
+    """Whether a SUMO network says where on Earth it lies, as maps of real roads do.
 
     Raises GeoReferenceError if the file cannot be read.
     """

@@ -101,11 +101,11 @@ def read_georeference(net_file: Path) -> GeoReference:
 
 
 def is_georeferenced(net_file: Path) -> bool:
-    """Whether a SUMO network says where on Earth it lies, as maps of real roads do.
-
-    Raises GeoReferenceError if the file cannot be read.
-    """
-    return _location(net_file).get("projParameter", "").strip() not in NO_PROJECTION
+    """Whether a SUMO network says where on Earth it lies, as maps of real roads do."""
+    try:
+        return _location(net_file).get("projParameter", "").strip() not in NO_PROJECTION
+    except GeoReferenceError:
+        return False
 
 
 def placed_start(start: StartPose | GeoStart | None, network: Path, mode: str = "route") -> StartPose | None:

@@ -35,7 +35,8 @@ PLOT = Path("out/bench/scaling.png")
 SPACING_M = 5.0
 CLOSURES_PER_VERTEX = 0.1  # as in the paper's map: 150 of 1,400 vertices
 STAGES = {
-    "search_route": "route search",
+    "most_likely_drive": "route search",
+    "match_status": "acceptance",
     "choose_lanes": "lane choice",
     "_line_and_places": "route line",
     "refine_along_route": "solver",

@@ -70,7 +70,7 @@ def match_status(
         start_known: whether a start pose was given.
     """
     gap = distant_gap(route, config)
-    explained = _explained(route, config)
+    explained = explained_samples(route, config)
     status = np.where(gap < config.least_gap_nats, MatchStatus.AMBIGUOUS, MatchStatus.MATCHED)
     status[~explained] = MatchStatus.OFF_NETWORK
     segments = with_evidence(route_segments(route, explained), route, control, config.least_evidence_nats)
@@ -83,7 +83,7 @@ def match_status(
     return status.astype(np.uint8)
 
 
-def _explained(route: Route, config: ConfidenceConfig) -> BoolArray:
+def explained_samples(route: Route, config: ConfidenceConfig) -> BoolArray:
     """Mask (T,) of the samples at which the route explains the drive: it is on the network, and its steps score well enough.
 
     Scores are averaged over a window around the sample, which is shorter at the ends of the drive, so that no single corner

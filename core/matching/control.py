@@ -42,7 +42,7 @@ def mirrored_nats(problem: SearchProblem, config: RouteSearchConfig, first: int,
     It is -inf if it is below ``least_nats``; the search ends as soon as that is certain.
     """
     mirrored = replace(problem, track=mirrored_part(problem.track, first, end))
-    start = starts_without_prior(mirrored, anchor_samples(mirrored.track, 1)[0], config)
+    start = starts_without_prior(mirrored, anchor_samples(mirrored.track, 1)[0], config, least_nats)
     return best_nats(mirrored, start.initial, config, least_nats)
 
 

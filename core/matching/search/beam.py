@@ -49,6 +49,7 @@ class Survivors(NamedTuple):
     row_start: NDArray[np.int64]  # (t + 1,)
     hypotheses: Hypotheses
     places: Places  # of the hypotheses off the network
+    died_out: bool  # whether the search ended because no hypothesis survived the step after the last
 
 
 class Alternatives(NamedTuple):
@@ -96,7 +97,7 @@ def forward(drive: Drive, model: SearchModel, limits: BeamLimits, initial: Hypot
     rows, places = with_room(initial, size + 1), with_room(initial_places, place_count + 1)
     row_start = np.zeros(samples + 1, np.int64)
     row_start[1] = size
-    scratch = _make_scratch(model)
+    scratch, died_out = _make_scratch(model), False
     for t in range(1, samples):
         begin, end = row_start[t - 1], row_start[t]
         observation = observation_of_step(drive, t)
@@ -109,9 +110,10 @@ def forward(drive: Drive, model: SearchModel, limits: BeamLimits, initial: Hypot
         least_nats = max(best - limits.beam_nats, limits.least_nats)
         row_start[t + 1] = end + _keep_best(rows[end:size], least_nats, limits.most_survivors)
         if row_start[t + 1] - end <= limits.enough_survivors or row_start[t + 1] >= limits.most_rows:
-            samples = t + 1 if row_start[t + 1] > end else t
+            died_out = row_start[t + 1] == end
+            samples = t if died_out else t + 1
             break
-    return Survivors(row_start[: samples + 1], rows[: row_start[samples]], places[:place_count])
+    return Survivors(row_start[: samples + 1], rows[: row_start[samples]], places[:place_count], died_out)
 
 
 @njit(cache=True, error_model="numpy")
@@ -208,7 +210,7 @@ def backward(
         survivors: what the forward pass returned.
         onward_nats: score of the best route onward from each survivor of the last sample; 0 if the drive ends there.
     """
-    row_start, rows, places = survivors
+    row_start, rows, places, _ = survivors
     times = row_start.shape[0] - 1
     through = np.full(rows.shape[0], NOWHERE, np.float32)
     best = NOWHERE

@@ -58,18 +58,19 @@ class Start(NamedTuple):
     step_nats: float  # mean log likelihood of a step after the anchor, for the best of the hypotheses there; -inf: there is none
 
 
-def starts_without_prior(problem: SearchProblem, anchor: int, config: RouteSearchConfig) -> Start:
+def starts_without_prior(problem: SearchProblem, anchor: int, config: RouteSearchConfig, least_nats: float = NOWHERE) -> Start:
     """Find hypotheses for the beginning of the drive without a start pose, by a search that begins at sample ``anchor``.
 
     The coarse search rates all bins and scales at the anchor, a fine one those that it finds good; what both find good is traced
-    back to the beginning of the drive.
+    back to the beginning of the drive. What scores less than ``least_nats`` over the turns after the anchor is dropped.
     """
-    nats, scales = _coarse_nats(problem, anchor, config), len(problem.log_scale)
+    nats, scales = _coarse_nats(problem, anchor, config, least_nats), len(problem.log_scale)
     bins = np.flatnonzero(nats.max(axis=1) > NOWHERE).astype(np.int32)
     hypotheses = _hypotheses_in(problem.graph, bins, scales, float(problem.track.heading_rad[anchor]))
     hypotheses["score_nats"] = nats[bins].ravel()
-    hypotheses, step_nats = _good_over_horizon(problem, anchor, hypotheses[hypotheses["score_nats"] > NOWHERE], config)
-    if anchor == 0:
+    hypotheses = hypotheses[hypotheses["score_nats"] > NOWHERE]
+    hypotheses, step_nats = _good_over_horizon(problem, anchor, hypotheses, config, least_nats)
+    if anchor == 0 or len(hypotheses) == 0:
         return Start(InitialHypotheses(hypotheses, _NO_PLACES), step_nats)
     return Start(_traced_to_beginning(problem, anchor, hypotheses, config), step_nats)
 
@@ -109,11 +110,12 @@ def _prior_nats(graph: LaneGraph, start: StartPose) -> Float32Array:
     return (-0.5 * (away**2 + turned**2)).astype(np.float32)
 
 
-def _coarse_nats(problem: SearchProblem, anchor: int, config: RouteSearchConfig) -> Float32Array:
+def _coarse_nats(problem: SearchProblem, anchor: int, config: RouteSearchConfig, least_nats: float) -> Float32Array:
     """Rate each fine bin and scale bin (N, K) as the state at the anchor, by a coarse search over the samples after it.
 
     The rating is the score of the best route that begins in the state, less that of the best of all; it is ``NOWHERE`` for states
-    more than ``seed_margin_nats`` behind. All fine states within one coarse state get the same rating.
+    more than ``seed_margin_nats`` behind, and for all of them if no route scores ``least_nats``. All fine states within one
+    coarse state get the same rating.
     """
     coarse = _coarse_problem(problem, config)
     # the steps of the coarse search are twice as long, so that it takes every second sample
@@ -122,7 +124,9 @@ def _coarse_nats(problem: SearchProblem, anchor: int, config: RouteSearchConfig)
     everywhere = np.arange(bin_count, dtype=np.int32)
     starts = _hypotheses_in(coarse.graph, everywhere, scales, float(problem.track.heading_rad[anchor]))
     initial = InitialHypotheses(starts, _NO_PLACES)
-    survivors = forward_pass(drive, model, initial, config.coarse_beam_nats, _MOST_COARSE, config.coarse_enough)
+    survivors = forward_pass(drive, model, initial, config.coarse_beam_nats, _MOST_COARSE, config.coarse_enough, least_nats)
+    if survivors.died_out and least_nats > NOWHERE:
+        return np.full((problem.graph.bin_count, len(problem.log_scale)), NOWHERE, np.float32)
     nothing_beyond = np.zeros(survivors.row_start[-1] - survivors.row_start[-2], np.float32)
     through = backward(drive, model, config.seed_margin_nats, survivors, nothing_beyond)[: len(starts)]
     coarse_bin = coarse.graph.lane_start[problem.graph.lane] + _coarse_bin_of_lane(problem.graph, coarse.graph)
@@ -166,25 +170,27 @@ def _coarse_bin_of_lane(fine: LaneGraph, coarse: LaneGraph) -> IntArray:
 
 
 def _good_over_horizon(
-    problem: SearchProblem, anchor: int, hypotheses: Hypotheses, config: RouteSearchConfig
+    problem: SearchProblem, anchor: int, hypotheses: Hypotheses, config: RouteSearchConfig, least_nats: float
 ) -> tuple[Hypotheses, float]:
     """Those of the hypotheses at the anchor that also explain the turns after it in fine bins, with their scores there.
 
     Without this, all fine states of a good coarse one would be traced back over the whole drive before it. The second value is
-    the mean log likelihood of a step on the best route from any of them.
+    the mean log likelihood of a step on the best route from any of them. There are none if no route scores ``least_nats``.
     """
     drive = compiled_drive(problem, problem.track.heading_rad[anchor : anchor + _HORIZON])
     steps = len(drive.heading_rad) - 1
-    if steps < 1:
+    if steps < 1 or len(hypotheses) == 0:
         return hypotheses, 0.0
     model, fresh = compiled_model(problem), hypotheses.copy()
     fresh["score_nats"] = 0.0  # the coarse scores are of the same turns and must not count twice
-    survivors = forward_pass(drive, model, InitialHypotheses(fresh, _NO_PLACES), config.beam_nats, config.most_survivors)
+    initial = InitialHypotheses(fresh, _NO_PLACES)
+    survivors = forward_pass(drive, model, initial, config.beam_nats, config.most_survivors, least_nats=least_nats)
+    if survivors.died_out and least_nats > NOWHERE:
+        return fresh[:0], NOWHERE
     last = last_survivors(survivors).hypotheses["score_nats"]
     through = backward(drive, model, config.seed_margin_nats, survivors, np.zeros(len(last), np.float32))[: len(fresh)]
     fresh["score_nats"] = through
-    ended = len(survivors.row_start) - 2 < steps
-    return fresh[through > NOWHERE], NOWHERE if ended else float(last.max()) / steps
+    return fresh[through > NOWHERE], NOWHERE if survivors.died_out else float(last.max()) / steps
 
 
 def _traced_to_beginning(

@@ -15,6 +15,7 @@ from rich.console import Console
 
 from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.contest.entry import Added, entries_of
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.pool import Workers, worker_pool
@@ -31,7 +32,9 @@ from hippodrome.sim.scenario import Scenario
 RESULTS = "results.json"
 
 
-def evaluate(paths: Sequence[Path], network: Path | None, seed: int | None, workers: int, out: Path) -> bool:
+def evaluate(
+    paths: Sequence[Path], network: Path | None, seed: int | None, workers: int, out: Path, methods: Sequence[Added] = ()
+) -> bool:
     """Evaluate scenarios and print their tables. Returns whether all their thresholds hold.
 
     Args:
@@ -40,21 +43,24 @@ def evaluate(paths: Sequence[Path], network: Path | None, seed: int | None, work
         seed: Seed that replaces the scenarios' own.
         workers: Number of processes.
         out: Folder for all files.
+        methods: Methods that take part beside ours and those that a scenario names.
 
     Raises:
-        HippodromeError: A scenario or its network cannot be used.
+        HippodromeError: A scenario, its network or a method cannot be used.
     """
     scenarios = load_scenarios(paths, network, seed)
-    return _report(scenarios, run_scenarios(scenarios, workers, out), out)
+    return _report(scenarios, run_scenarios(scenarios, workers, out, methods), out)
 
 
-def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path) -> Results:
+def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path, methods: Sequence[Added] = ()) -> Results:
     """Evaluate scenarios and write ``results.json``, tables, figures and report into ``out``. Raises HippodromeError."""
+    for scenario in scenarios:
+        entries_of(scenario, methods)  # what cannot be loaded is said before anything is simulated
     require_gl()
     plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
     with worker_pool(workers) as pool:
         make_recordings(plans, pool)
-        tasks = [EvaluationTask(scenario, out) for scenario in scenarios]
+        tasks = [EvaluationTask(scenario, out, methods=tuple(methods)) for scenario in scenarios]
         rows = pool.run("evaluate", evaluate_scenario, tasks)
     results = Results(scenarios=tuple(rows))
     write_results(out / RESULTS, results)

@@ -12,6 +12,7 @@ from hippodrome.core.mapping.mapper import MapperConfig
 from hippodrome.core.refinement.refine import RefineConfig
 from hippodrome.sim.ego import EgoSpec
 from hippodrome.sim.episode import camera_divider
+from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.renamed import with_present_names
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scene.conditions import Conditions
@@ -21,6 +22,8 @@ from hippodrome.sim.tour import TourSpec
 from hippodrome.sim.town import TownSpec
 from hippodrome.sim.traffic import TrafficSpec
 from hippodrome.sim.yaml_file import load_yaml
+
+METHOD_NAME = r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$"  # of a method: it stands in tables, and files are named after it
 
 
 class DriveSpec(Spec):
@@ -58,6 +61,9 @@ class Scenario(Spec):
     mapper: MapperConfig = MapperConfig()
     refine: RefineConfig = RefineConfig()
     localizer: LocalizerConfig = LocalizerConfig()
+    methods: dict[Annotated[str, Field(pattern=METHOD_NAME)], MethodSpec] = Field(
+        default_factory=dict
+    )  # methods that take part beside ours, by name
     thresholds: Thresholds = Thresholds()
 
     @model_validator(mode="before")
@@ -69,6 +75,9 @@ class Scenario(Spec):
     def _rates_fit(self) -> Scenario:
         camera_divider(self.camera, self.odometry_rate_hz)
         return self
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.seed))  # equal scenarios have equal ones; the dictionary of methods has no hash
 
     @property
     def noise_name(self) -> str:

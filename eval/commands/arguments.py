@@ -100,12 +100,32 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def add_methods(parser: argparse.ArgumentParser) -> None:
+    """Methods that take part beside ours."""
+    parser.add_argument(
+        "--method", type=_method, action="append", default=[], metavar="[NAME=]METHOD",
+        help="a method that takes part beside ours, also several times: a Python class, my_package.my_module:MyMapper; a program "
+             "that reads files, 'exec:./run.sh {sequence} {out}'; one that is fed frame by frame, 'stream:./client'; or the name "
+             "of an installed one; docs/methods.md shows each (default: ours and the scenario's own)",
+    )  # fmt: skip
+
+
 def add_out(parser: argparse.ArgumentParser, default: str) -> None:
     """The folder of the results."""
     parser.add_argument(
         "--out", type=Path, default=Path(default), metavar="DIR",
         help=f"folder for the results; what is finished in it is not made again (default: {default})",
     )  # fmt: skip
+
+
+def _method(text: str) -> Any:
+    """A method, as ``--method`` names it."""
+    from hippodrome.eval.contest.entry import parse_method  # not before it is needed: --help answers at once
+
+    try:
+        return parse_method(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def positive(text: str) -> int:

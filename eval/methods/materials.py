@@ -11,9 +11,10 @@ import numpy as np
 
 from hippodrome.core.refinement.refine import RefineConfig
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import Refinement, StartPose, Trajectory
+from hippodrome.core.types import CognitiveMap, FloatArray, StartPose, Trajectory
 from hippodrome.eval.files.scenarios import effective_configuration
 from hippodrome.eval.methods.method import Method, RefineMode
+from hippodrome.eval.methods.protocol import Mapped
 from hippodrome.eval.methods.stages import Localization
 from hippodrome.eval.metrics.alignment import AlignmentName
 from hippodrome.eval.metrics.localization import LocalizationScore
@@ -106,12 +107,24 @@ def score_trajectory(trajectory: Trajectory, truth: Trajectory, alignment: Align
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TopometricResult:
-    """What one mode of the refinement gave, and how the second drive was localized in its map."""
+class Outcome:
+    """What one method came to on one scenario: its map of the first drive, and how the second was localized in it."""
 
-    refinement: Refinement
+    method: Method
+    mapped: Mapped
     scored: ScoredTrajectory
-    map_bytes: int
-    cpu_s: float  # of the refinement
-    localization: Localization
-    localized: LocalizationScore
+    cpu_s: float  # of its map, together with the map that it builds on
+    own_cpu_s: float  # of its map alone
+    step_s: FloatArray  # (N,) from handing it an observation of the mapping drive until it was done with it; empty if it saw none
+    map_bytes: int | None = None
+    covered: float = 1.0  # share of the times at which it was to be scored for which it has a pose
+    peak_rss_bytes: int | None = None  # of a process of its own, if it has one
+    localization: Localization | None = None
+    localized: LocalizationScore | None = None
+    failure: str | None = None  # why it has no localization, if it should have one
+
+    @property
+    def refined(self) -> CognitiveMap | None:
+        """Its topometric map, if it made one of our kind."""
+        found = self.mapped.cognitive_map
+        return found if found is not None and found.frame == "network" else None

@@ -35,6 +35,7 @@ class Method:
     system: str | None = None  # label of the system of which it is a variant, if it is one of several
     map_file: str | None = None  # name of its map in a scenario's folder, if it keeps one there
     mode: RefineMode | None = None  # mode of the refinement, if its map is a refined one
+    drawn: bool = True  # whether its trajectory is drawn; not if it would cover another's, whose poses are the same
 
     @property
     def alignment(self) -> AlignmentName:
@@ -56,6 +57,7 @@ NO_ATTRACTOR: Final = Method(
     "own",
     "semi-metric-no-attractor",
     map_file="semi-metric-no-attractor.pbstream",
+    drawn=False,
 )
 TOPOMETRIC_PAPER: Final = Method(
     "topometric_paper",
@@ -101,8 +103,13 @@ def method_of(label: str) -> Method:
     known = {method.label: method for method in METHODS}
     if label in known:
         return known[label]
-    stem = label.replace(" (", "-").replace(")", "").replace(",", "").replace(" ", "-")
+    stem = stem_of(label)
     whole = max((name for name in known if label.startswith(name)), key=len, default=None)
     if whole is None:
         return Method(stem, label, "own", stem)
     return Method(stem, label, known[whole].frame, stem, system=known[whole].system or whole)
+
+
+def stem_of(label: str) -> str:
+    """What the files of a method with this label are named after."""
+    return label.replace(" (", "-").replace(")", "").replace(",", "").replace(" ", "-")

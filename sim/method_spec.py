@@ -1,0 +1,47 @@
+"""A method that takes part beside ours, as a scenario names it."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from hippodrome.sim.spec import Spec
+
+Layout = Literal["tum", "euroc", "kitti"]
+
+
+class MethodSpec(Spec):
+    """One method: a Python class, a program that reads files, or a program that is fed frame by frame."""
+
+    class_: Annotated[str | None, Field(alias="class", pattern=r"^[\w.]+:[\w.]+$")] = None  # my_package.my_module:MyMapper
+    command: str | None = None  # of a program that reads files; {sequence} and {out} stand for folders, {map} for its map's
+    stream: str | None = None  # of a program that is fed on standard input
+    config: dict[str, Any] = Field(default_factory=dict)  # for the class: the fields of its own Config
+    input: Layout = "tum"  # for the program that reads files: how the sequence lies there
+    frame: Literal["own", "network", "metric"] | None = None  # in which a program answers; None: what a class says, or own
+    needs: tuple[Literal["road_network", "start_pose"], ...] = ()  # of a program; a class declares its own
+    localizes: bool = False  # whether the program is run on the second drive as well
+    time_limit_s: Annotated[float, Field(gt=0, le=86_400)] = 3_600.0  # of a program, for each drive
+    memory_limit_mb: Annotated[float, Field(ge=64)] = 8_000.0  # of a program: address space of each of its processes
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_form(cls, data: Any) -> Any:
+        """A text alone is ``exec:COMMAND``, ``stream:COMMAND``, or a class."""
+        if not isinstance(data, str):
+            return data
+        kind, _, rest = data.partition(":")
+        return {"command": rest} if kind == "exec" else {"stream": rest} if kind == "stream" else {"class": data}
+
+    @model_validator(mode="after")
+    def _one_way_in(self) -> MethodSpec:
+        if sum(way is not None for way in (self.class_, self.command, self.stream)) != 1:
+            raise ValueError("a method has one of the keys class, command and stream")
+        if self.command is not None and not ("{sequence}" in self.command and "{out}" in self.command):
+            raise ValueError("a command names the folders {sequence} and {out}, as in './run.sh {sequence} {out}'")
+        return self
+
+    def __hash__(self) -> int:
+        return hash(json.dumps(self.model_dump(mode="json"), sort_keys=True))

@@ -9,11 +9,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from pydantic import BaseModel, ValidationError
 
-from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, stem_of
+from hippodrome.eval.contest.program import ProgramLocalizer, ProgramMapper
+from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, ScoringFrame, stem_of
 from hippodrome.eval.methods.ours import DeadReckoning, SemiMetric, Topometric, TopometricPaper
 from hippodrome.eval.methods.protocol import Describes, Localizes, Maps, MethodError, Needs
 from hippodrome.eval.rivals.rows import NoAttractor, RatSlamMethod
@@ -113,18 +114,29 @@ def load_class(reference: str) -> type[Any]:
 
 def _foreign(name: str | None, spec: MethodSpec, scenario: Scenario) -> Entry:
     """The entry of a method that is not ours."""
-    assert spec.class_ is not None
+    if spec.class_ is None:
+        return _program(name, spec)
     cls = load_class(spec.class_)
-    label = name or str(getattr(cls, "label", cls.__name__))
+    method = _card(name or str(getattr(cls, "label", cls.__name__)), str(spec.frame or getattr(cls, "frame", "own")))
+    return _entry_of(cls, method, _made(cls, spec.config, scenario, method.label), spec.class_)
+
+
+def _program(name: str | None, spec: MethodSpec) -> Entry:
+    """The entry of a program, in a process of its own."""
+    command = spec.command or spec.stream or ""
+    runner = ProgramLocalizer(spec) if spec.localize else ProgramMapper(spec)
+    needs = Needs(road_network="road_network" in spec.needs, start_pose="start_pose" in spec.needs)
+    source = f"{'stream' if spec.stream else 'exec'}:{command}"
+    return Entry(_card(name or _program_name(command), spec.frame or "own"), runner, needs, None, source, isolated=True)
+
+
+def _card(label: str, frame: str) -> Method:
     if not re.match(METHOD_NAME, label):
-        raise MethodError(f"method {spec.class_}: '{label}' cannot be its name: letters, digits and . _ + ( ) , - up to 40")
-    frame = spec.frame or getattr(cls, "frame", "own")
+        raise MethodError(f"method '{label}': this cannot be its name: letters, digits, blanks and . _ + ( ) , - up to 40")
     if frame not in ALIGNMENTS:
         raise MethodError(f"method {label}: frame '{frame}' is unknown; use one of {', '.join(ALIGNMENTS)}")
     stem = stem_of(label)
-    return _entry_of(
-        cls, Method(stem, label, frame, stem, map_file=f"{stem}.pbstream"), _made(cls, spec.config, scenario, label), spec.class_
-    )
+    return Method(stem, label, cast(ScoringFrame, frame), stem, map_file=f"{stem}.pbstream")
 
 
 def _entry_of(cls: type[Any], method: Method, runner: Any, source: str) -> Entry:

@@ -18,12 +18,23 @@ import numpy as np
 
 from hippodrome._files import write_atomically
 from hippodrome.core.se2 import interpolate
-from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
+from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, Trajectory
 from hippodrome.eval.contest.entry import Entry
 from hippodrome.eval.methods.feed import Feed
 from hippodrome.eval.methods.materials import Materials, Outcome, score_trajectory, true_start
 from hippodrome.eval.methods.method import SEMI_METRIC
-from hippodrome.eval.methods.protocol import Given, Localizes, Mapped, Maps, MethodError, as_estimate, as_mapped
+from hippodrome.eval.methods.protocol import (
+    Cost,
+    Given,
+    Localized,
+    Localizes,
+    Localizing,
+    Mapped,
+    Maps,
+    MethodError,
+    as_estimate,
+    as_mapped,
+)
 from hippodrome.eval.methods.stages import Localization
 from hippodrome.eval.metrics.association import check_trajectory
 from hippodrome.eval.metrics.localization import score_localization
@@ -122,7 +133,10 @@ def _draw(entry: Entry, materials: Materials, drawn: Mapping[str, Drawn | str], 
     feed.settle()
     check_trajectory(mapped.trajectory, label)
     map_bytes = _guarded(label, lambda: _save(entry, mapped, materials), materials)
-    return Drawn(mapped, cpu_s, cpu_s + (base.whole_s if base else 0.0), feed.step_s, map_bytes)
+    step_s = feed.step_s
+    if (cost := mapped.cost) is not None:
+        cpu_s, step_s = cost.cpu_s, np.zeros(0) if cost.step_s is None else cost.step_s
+    return Drawn(mapped, cpu_s, cpu_s + (base.whole_s if base else 0.0), step_s, map_bytes)
 
 
 def _save(entry: Entry, mapped: Mapped, materials: Materials) -> int | None:
@@ -148,6 +162,7 @@ def _given(entry: Entry, materials: Materials, drive: Recording, folder: Path, b
         roads=materials.roads if needs.road_network else None,
         start=true_start(drive) if needs.start_pose and drive is materials.mapping else None,
         base=base,
+        concealed=tuple(folder for folder in materials.truth_folders if folder.is_dir()),
     )
 
 
@@ -176,6 +191,7 @@ def _outcome(entry: Entry, materials: Materials, drawn: Drawn | str, at_s: Float
         step_s=drawn.step_s,
         map_bytes=drawn.map_bytes,
         covered=covered,
+        peak_rss_bytes=drawn.mapped.cost.peak_rss_bytes if drawn.mapped.cost else None,
     )
     if not isinstance(entry.runner, Localizes):
         return outcome
@@ -210,16 +226,23 @@ def _localize(entry: Entry, materials: Materials, mapped: Mapped, folder: Path) 
     label, drive = entry.method.label, materials.drive
     given = replace(_given(entry, materials, drive, folder, None), mapped=mapped)
     feed = Feed(drive.observations() if entry.needs.camera else drive.self_motion())
-    estimates = _guarded(
-        label, lambda: [as_estimate(answer, label) for answer in entry.runner.localize(iter(feed), given)], materials
-    )
+    estimates, cost = _guarded(label, lambda: _answers(label, entry.runner.localize(iter(feed), given)), materials)
     feed.settle()
     times_s = drive.samples.t_s
     if len(estimates) != len(times_s):
         raise MethodError(f"{len(estimates)} answers to {len(times_s)} observations; one for each is expected, in their order")
     if not np.allclose([estimate.t_s for estimate in estimates], times_s, rtol=0.0, atol=1e-6):
         raise MethodError("its answers have other times than the observations; answer each with its own t_s")
-    return Localization(estimates, feed.step_cpu_s)
+    if cost is None:
+        return Localization(estimates, feed.step_cpu_s)
+    return Localization(estimates, np.full(len(times_s), cost.cpu_s / len(times_s)) if cost.step_s is None else cost.step_s)
+
+
+def _answers(label: str, answers: Localizing) -> tuple[list[LocalizationEstimate], Cost | None]:
+    """What ``localize`` gave, answer by answer; a method that yields them does its work here."""
+    if isinstance(answers, Localized):
+        return [as_estimate(answer, label) for answer in answers.answers], answers.cost
+    return [as_estimate(answer, label) for answer in answers], None
 
 
 def _guarded(label: str, function: Callable[[], ResultT], materials: Materials) -> ResultT:

@@ -40,6 +40,11 @@ class Materials:
     drive: Recording  # the second drive, which is localized in the map
 
     @property
+    def truth_folders(self) -> tuple[Path, ...]:
+        """Folders that the truth can be read from: the recordings, and this scenario's results."""
+        return self.mapping.folder.parent, self.folder
+
+    @property
     def duration_s(self) -> float:
         """Duration of the mapping drive."""
         return float(self.mapping.samples.t_s[-1])

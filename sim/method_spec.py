@@ -16,13 +16,13 @@ class MethodSpec(Spec):
     """One method: a Python class, a program that reads files, or a program that is fed frame by frame."""
 
     class_: Annotated[str | None, Field(alias="class", pattern=r"^[\w.]+:[\w.]+$")] = None  # my_package.my_module:MyMapper
-    command: str | None = None  # of a program that reads files; {sequence} and {out} stand for folders, {map} for its map's
+    command: str | None = None  # of a program that reads files; {sequence} and {out} stand for folders
     stream: str | None = None  # of a program that is fed on standard input
     config: dict[str, Any] = Field(default_factory=dict)  # for the class: the fields of its own Config
     input: Layout = "tum"  # for the program that reads files: how the sequence lies there
     frame: Literal["own", "network", "metric"] | None = None  # in which a program answers; None: what a class says, or own
     needs: tuple[Literal["road_network", "start_pose"], ...] = ()  # of a program; a class declares its own
-    localizes: bool = False  # whether the program is run on the second drive as well
+    localize: str | None = None  # command of the same kind for the second drive; {map} stands for what the first call left
     time_limit_s: Annotated[float, Field(gt=0, le=86_400)] = 3_600.0  # of a program, for each drive
     memory_limit_mb: Annotated[float, Field(ge=64)] = 8_000.0  # of a program: address space of each of its processes
 

@@ -24,6 +24,7 @@ from hippodrome.sim.traffic import TrafficSpec
 from hippodrome.sim.yaml_file import load_yaml
 
 METHOD_NAME = r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$"  # of a method: it stands in tables, and files are named after it
+MethodName = Annotated[str, Field(pattern=METHOD_NAME)]
 
 
 class DriveSpec(Spec):
@@ -61,9 +62,7 @@ class Scenario(Spec):
     mapper: MapperConfig = MapperConfig()
     refine: RefineConfig = RefineConfig()
     localizer: LocalizerConfig = LocalizerConfig()
-    methods: dict[Annotated[str, Field(pattern=METHOD_NAME)], MethodSpec] = Field(
-        default_factory=dict
-    )  # methods that take part beside ours, by name
+    methods: dict[MethodName, MethodSpec] = Field(default_factory=dict)  # that take part beside ours, by name
     thresholds: Thresholds = Thresholds()
 
     @model_validator(mode="before")

@@ -9,12 +9,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
 
 from hippodrome.eval.contest.program import ProgramLocalizer, ProgramMapper
-from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, ScoringFrame, stem_of
+from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, stem_of
 from hippodrome.eval.methods.ours import DeadReckoning, SemiMetric, Topometric, TopometricPaper
 from hippodrome.eval.methods.protocol import Describes, Localizes, Maps, MethodError, Needs
 from hippodrome.eval.rivals.rows import NoAttractor, RatSlamMethod
@@ -136,7 +136,7 @@ def _card(label: str, frame: str) -> Method:
     if frame not in ALIGNMENTS:
         raise MethodError(f"method {label}: frame '{frame}' is unknown; use one of {', '.join(ALIGNMENTS)}")
     stem = stem_of(label)
-    return Method(stem, label, cast(ScoringFrame, frame), stem, map_file=f"{stem}.pbstream")
+    return Method(stem, label, frame, stem, map_file=f"{stem}.pbstream")
 
 
 def _entry_of(cls: type[Any], method: Method, runner: Any, source: str) -> Entry:

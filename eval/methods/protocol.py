@@ -11,7 +11,7 @@ It receives observations and what it says that it needs. It is never given the t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, runtime_checkable
@@ -56,6 +56,23 @@ class Needs:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Cost:
+    """What a process of its own took, where that is not what our process spent on it."""
+
+    cpu_s: float  # user and system time of all its processes
+    peak_rss_bytes: int | None = None  # the most memory that one of its processes held
+    step_s: FloatArray | None = None  # (N,) per observation, in s; None if it is not handed them one by one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Localized:
+    """All answers of ``localize`` at once, for a method that has its costs measured elsewhere."""
+
+    answers: Sequence[Answer | LocalizationEstimate]
+    cost: Cost
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Mapped:
     """What ``map`` made: a trajectory, and whatever else the method keeps of the drive."""
 
@@ -64,6 +81,7 @@ class Mapped:
     state: Any = None  # anything that its ``localize`` wants to have back as ``given.mapped.state``
     figures: dict[str, Any] = field(default_factory=dict)  # further fields of its row
     save: Callable[[Path], int] | None = None  # writes its map file and answers with the size in bytes
+    cost: Cost | None = None  # if it was measured elsewhere
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,6 +97,7 @@ class Given:
     start: StartPose | None = None
     base: Mapped | None = None  # the map of the method that it builds on, if it names one in ``builds_on``
     mapped: Mapped | None = None  # for ``localize``: what its own ``map`` returned, or else its ``base``
+    concealed: tuple[Path, ...] = ()  # folders with the truth, which a program of its own is not to see
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +113,7 @@ class Answer:
 
 
 Mapping: TypeAlias = Mapped | Trajectory | Iterable[TimedPose]
-Localizing: TypeAlias = Iterable[Answer | LocalizationEstimate]
+Localizing: TypeAlias = Iterable[Answer | LocalizationEstimate] | Localized
 
 
 @runtime_checkable

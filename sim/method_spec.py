@@ -41,6 +41,14 @@ class MethodSpec(Spec):
             raise ValueError("a method has one of the keys class, command and stream")
         if self.command is not None and not ("{sequence}" in self.command and "{out}" in self.command):
             raise ValueError("a command names the folders {sequence} and {out}, as in './run.sh {sequence} {out}'")
+        if self.localize is not None and self.class_ is not None:
+            raise ValueError("localize is a command, for programs; a class has a function of this name")
+        if (
+            self.localize is not None
+            and self.command is not None
+            and not all(name in self.localize for name in ("{sequence}", "{map}", "{out}"))
+        ):
+            raise ValueError("localize names the folders {sequence}, {map} and {out}, as in './run.sh {sequence} {map} {out}'")
         return self
 
     def __hash__(self) -> int:

@@ -14,6 +14,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from hippodrome.eval.contest.program import ProgramLocalizer, ProgramMapper
+from hippodrome.eval.contest.stream import StreamLocalizer, StreamMapper
 from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, stem_of
 from hippodrome.eval.methods.ours import DeadReckoning, SemiMetric, Topometric, TopometricPaper
 from hippodrome.eval.methods.protocol import Describes, Localizes, Maps, MethodError, Needs
@@ -124,7 +125,8 @@ def _foreign(name: str | None, spec: MethodSpec, scenario: Scenario) -> Entry:
 def _program(name: str | None, spec: MethodSpec) -> Entry:
     """The entry of a program, in a process of its own."""
     command = spec.command or spec.stream or ""
-    runner = ProgramLocalizer(spec) if spec.localize else ProgramMapper(spec)
+    mapper, localizer = (StreamMapper, StreamLocalizer) if spec.stream else (ProgramMapper, ProgramLocalizer)
+    runner = localizer(spec) if spec.localize else mapper(spec)
     needs = Needs(road_network="road_network" in spec.needs, start_pose="start_pose" in spec.needs)
     source = f"{'stream' if spec.stream else 'exec'}:{command}"
     return Entry(_card(name or _program_name(command), spec.frame or "own"), runner, needs, None, source, isolated=True)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from hippodrome.eval.contest.entry import Added, entries_of
+from hippodrome.eval.contest.entry import entries_of
 from hippodrome.eval.contest.perform import drawn_methods, perform
 from hippodrome.eval.figures.scenario import draw_scenario
 from hippodrome.eval.methods.materials import gather
@@ -31,7 +31,6 @@ class EvaluationTask:
     scenario: Scenario
     out: Path
     figures: bool = True  # drawing takes most of a short scenario's time, so sweeps of many do without
-    methods: tuple[Added, ...] = ()  # that take part beside ours and the scenario's own
 
 
 def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
@@ -44,7 +43,7 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
     """
     warm_up()
     materials = gather(task.scenario, task.out)
-    performance = perform(materials, entries_of(task.scenario, task.methods))
+    performance = perform(materials, entries_of(task.scenario))
     shown = drawn_methods(performance.outcomes)
     scored = {outcome.method: outcome.scored for outcome in shown}
     localized = {outcome.method: outcome for outcome in shown if outcome.localized is not None}

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.contest.entry import Added, entries_of
+from hippodrome.eval.contest.entry import Added, entries_of, with_methods
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.pool import Workers, worker_pool
@@ -48,19 +48,19 @@ def evaluate(
     Raises:
         HippodromeError: A scenario, its network or a method cannot be used.
     """
-    scenarios = load_scenarios(paths, network, seed)
-    return _report(scenarios, run_scenarios(scenarios, workers, out, methods), out)
+    scenarios = load_scenarios(paths, network, seed, methods)
+    return _report(scenarios, run_scenarios(scenarios, workers, out), out)
 
 
-def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path, methods: Sequence[Added] = ()) -> Results:
+def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path) -> Results:
     """Evaluate scenarios and write ``results.json``, tables, figures and report into ``out``. Raises HippodromeError."""
     for scenario in scenarios:
-        entries_of(scenario, methods)  # what cannot be loaded is said before anything is simulated
+        entries_of(scenario)  # what cannot be loaded is said before anything is simulated
     require_gl()
     plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
     with worker_pool(workers) as pool:
         make_recordings(plans, pool)
-        tasks = [EvaluationTask(scenario, out, methods=tuple(methods)) for scenario in scenarios]
+        tasks = [EvaluationTask(scenario, out) for scenario in scenarios]
         rows = pool.run("evaluate", evaluate_scenario, tasks)
     results = Results(scenarios=tuple(rows))
     write_results(out / RESULTS, results)
@@ -80,9 +80,15 @@ def render(paths: Sequence[Path], network: Path | None, seed: int | None, worker
         print(plan.folder())
 
 
-def load_scenarios(paths: Sequence[Path], network: Path | None, seed: int | None) -> list[Scenario]:
-    """Read scenarios. Raises HippodromeError if one cannot be used, or if two have one name, as results are filed by name."""
-    scenarios = [read_scenario(path, network, seed) for path in paths]
+def load_scenarios(
+    paths: Sequence[Path], network: Path | None, seed: int | None, methods: Sequence[Added] = ()
+) -> list[Scenario]:
+    """Read scenarios, and add methods to each.
+
+    Raises:
+        HippodromeError: One cannot be used, or two have one name, as results are filed by name.
+    """
+    scenarios = [with_methods(read_scenario(path, network, seed), methods) for path in paths]
     name, times = Counter(scenario.name for scenario in scenarios).most_common(1)[0]
     if times > 1:
         raise HippodromeError(f"{times} scenarios are named '{name}': results are filed by name, so give each its own")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, model_serializer, model_validator
 
 from hippodrome.sim.spec import Spec
 
@@ -51,5 +51,13 @@ class MethodSpec(Spec):
             raise ValueError("localize names the folders {sequence}, {map} and {out}, as in './run.sh {sequence} {map} {out}'")
         return self
 
+    @model_serializer(mode="plain")
+    def _as_written(self) -> dict[str, Any]:
+        """Only what differs from the defaults, under the names of the file: it reads back as the same method."""
+        fields = type(self).model_fields
+        values = {name: getattr(self, name) for name in fields}
+        kept = {name: value for name, value in values.items() if value != fields[name].get_default(call_default_factory=True)}
+        return {fields[name].alias or name: list(value) if isinstance(value, tuple) else value for name, value in kept.items()}
+
     def __hash__(self) -> int:
-        return hash(json.dumps(self.model_dump(mode="json"), sort_keys=True))
+        return hash(json.dumps(self.model_dump(), sort_keys=True, default=str))

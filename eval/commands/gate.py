@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_out, add_workers
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_methods, add_out, add_workers
 
 SEEDS = (1, 2, 3)
 
@@ -41,6 +41,7 @@ def add_gate_commands(commands: Any) -> None:
         help="run nothing: say how large a regression of this method the gate would catch, on the baseline's own figures "
              "(without METHOD: topometric; default: the gate is run)",
     )  # fmt: skip
+    add_methods(parser)
     add_workers(parser)
     add_out(parser, "out/gate")
     parser.add_argument(
@@ -82,7 +83,8 @@ def _gate(options: argparse.Namespace) -> int:
         print_power(read_baseline(options.baseline), options.power, Console())
         return DONE
     names = ("scenarios", "seeds", "baseline", "update", "workers", "out", "junit")
-    return DONE if gate(GateRequest(**{name: getattr(options, name) for name in names})) else THRESHOLD_FAILED
+    request = GateRequest(**{name: getattr(options, name) for name in names}, methods=options.method)
+    return DONE if gate(request) else THRESHOLD_FAILED
 
 
 def _compare(options: argparse.Namespace) -> int:

@@ -77,15 +77,29 @@ def parse_method(text: str) -> Added:
     return Added(name or (_program_name(rest) if kind in ("exec", "stream") else None), spec)
 
 
-def entries_of(scenario: Scenario, added: Sequence[Added] = ()) -> list[Entry]:
-    """All entries of one scenario: ours, then those that it names itself, then those of the command line.
+def with_methods(scenario: Scenario, added: Sequence[Added]) -> Scenario:
+    """The scenario with methods added to its own, as if they stood in its file. Raises MethodError if two have one name."""
+    methods = dict(scenario.methods)
+    for one in added:
+        name = one.name
+        if name is None:
+            assert one.spec.class_ is not None
+            cls = load_class(one.spec.class_)
+            name = _card(str(getattr(cls, "label", cls.__name__)), "own").label
+        if name in methods:
+            raise MethodError(f"method {name}: there is one of this name already; give it another, NAME=...")
+        methods[name] = one.spec
+    return scenario.model_copy(update={"methods": methods})
+
+
+def entries_of(scenario: Scenario) -> list[Entry]:
+    """All entries of one scenario: ours, then those that it names.
 
     Raises:
         MethodError: A method cannot be loaded, or two have one name.
     """
     ours = [_entry_of(cls, cls.card, _made(cls, {}, scenario, cls.card.label), "hippodrome") for cls in BUILT_IN]
     theirs = [_foreign(name, spec, scenario) for name, spec in scenario.methods.items()]
-    theirs += [_foreign(one.name, one.spec, scenario) for one in added]
     entries = [*ours, *theirs]
     _require_names(entries)
     return entries
@@ -113,23 +127,23 @@ def load_class(reference: str) -> type[Any]:
     return found
 
 
-def _foreign(name: str | None, spec: MethodSpec, scenario: Scenario) -> Entry:
+def _foreign(name: str, spec: MethodSpec, scenario: Scenario) -> Entry:
     """The entry of a method that is not ours."""
     if spec.class_ is None:
         return _program(name, spec)
     cls = load_class(spec.class_)
-    method = _card(name or str(getattr(cls, "label", cls.__name__)), str(spec.frame or getattr(cls, "frame", "own")))
+    method = _card(name, str(spec.frame or getattr(cls, "frame", "own")))
     return _entry_of(cls, method, _made(cls, spec.config, scenario, method.label), spec.class_)
 
 
-def _program(name: str | None, spec: MethodSpec) -> Entry:
+def _program(name: str, spec: MethodSpec) -> Entry:
     """The entry of a program, in a process of its own."""
     command = spec.command or spec.stream or ""
     mapper, localizer = (StreamMapper, StreamLocalizer) if spec.stream else (ProgramMapper, ProgramLocalizer)
     runner = localizer(spec) if spec.localize else mapper(spec)
     needs = Needs(road_network="road_network" in spec.needs, start_pose="start_pose" in spec.needs)
     source = f"{'stream' if spec.stream else 'exec'}:{command}"
-    return Entry(_card(name or _program_name(command), spec.frame or "own"), runner, needs, None, source, isolated=True)
+    return Entry(_card(name, spec.frame or "own"), runner, needs, None, source, isolated=True)
 
 
 def _card(label: str, frame: str) -> Method:

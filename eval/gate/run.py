@@ -10,6 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from hippodrome._files import write_atomically
+from hippodrome.eval.contest.entry import Added
 from hippodrome.eval.gate.baseline import Baseline, GateError, baseline_of, read_baseline, write_baseline
 from hippodrome.eval.gate.compare import MIN_PAIRS, Verdict, compare
 from hippodrome.eval.gate.report import junit_xml, print_verdict, summary_markdown
@@ -32,6 +33,7 @@ class GateRequest:
     workers: int
     out: Path
     junit: Path | None  # where the verdict goes as JUnit XML too
+    methods: Sequence[Added] = ()  # that take part beside ours and the scenarios' own
 
 
 def gate(request: GateRequest) -> bool:
@@ -91,4 +93,5 @@ def broken_limits(runs: Sequence[Results]) -> list[str]:
 
 def _run(request: GateRequest, seed: int) -> Results:
     """One seed; recordings that are there already are not made again, everything after them is."""
-    return run_scenarios(load_scenarios(request.scenarios, None, seed), request.workers, request.out / f"seed-{seed}")
+    scenarios = load_scenarios(request.scenarios, None, seed, request.methods)
+    return run_scenarios(scenarios, request.workers, request.out / f"seed-{seed}")

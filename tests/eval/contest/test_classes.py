@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.contest.entry import BUILT_IN, entries_of, load_class, parse_method
+from hippodrome.eval.contest.entry import BUILT_IN, entries_of, load_class, parse_method, with_methods
 from hippodrome.eval.contest.perform import perform
 from hippodrome.sim.scenario import Scenario
 
@@ -99,7 +99,7 @@ def module(tmp_path, monkeypatch):
 
 
 def row_of(materials, name, scenario=None):
-    entry = entries_of(scenario or materials.scenario, [parse_method(f"mine=entrants:{name}")])[-1]
+    entry = entries_of(with_methods(scenario or materials.scenario, [parse_method(f"mine=entrants:{name}")]))[-1]
     return perform(materials, [entry]).rows[0]
 
 
@@ -177,14 +177,14 @@ def test_a_class_that_is_not_there_is_named(reference, cause):
 
 def test_a_class_without_any_of_the_functions_is_refused(materials):
     with pytest.raises(HippodromeError, match="none of the functions map, localize and describe"):
-        entries_of(materials.scenario, [parse_method("entrants:Empty")])
+        entries_of(with_methods(materials.scenario, [parse_method("entrants:Empty")]))
 
 
 def test_two_methods_of_one_name_are_refused(materials):
     twice = [parse_method("entrants:Mapper"), parse_method("entrants:Mapper")]
     for added in (twice, [parse_method("topometric=entrants:Mapper")], [parse_method("ORB-SLAM3=entrants:Mapper")]):
         with pytest.raises(HippodromeError, match="one of this name already"):
-            entries_of(materials.scenario, added)
+            entries_of(with_methods(materials.scenario, added))
 
 
 @pytest.mark.parametrize("text", ["absent", "exec:./run.sh", "a:b:c", "=x", "mine=", "exec:"])

@@ -4,7 +4,7 @@ import stat
 
 import pytest
 
-from hippodrome.eval.contest.entry import Added, entries_of
+from hippodrome.eval.contest.entry import Added, entries_of, with_methods
 from hippodrome.eval.contest.perform import perform
 from hippodrome.eval.contest.process import can_conceal
 from hippodrome.sim.method_spec import MethodSpec
@@ -33,7 +33,7 @@ def row(materials, tmp_path, monkeypatch):
         (tmp_path / "program").write_text(text)
         (tmp_path / "program").chmod(stat.S_IRWXU)
         added = Added("mine", MethodSpec(command=command, **settings))
-        entry = entries_of(materials.scenario, [added])[-1]
+        entry = entries_of(with_methods(materials.scenario, [added]))[-1]
         return perform(materials, [entry]).rows[0]
 
     return run

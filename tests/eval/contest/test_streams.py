@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hippodrome.eval.contest.entry import Added, entries_of, parse_method
+from hippodrome.eval.contest.entry import Added, entries_of, parse_method, with_methods
 from hippodrome.eval.contest.perform import perform
 from hippodrome.sim.method_spec import MethodSpec
 
@@ -69,7 +69,7 @@ while (message := parse_length_prefixed(ToMethod, sys.stdin.buffer)) is not None
 
 
 def rows_of(materials, *added):
-    entries = entries_of(materials.scenario, added)[-len(added) :]
+    entries = entries_of(with_methods(materials.scenario, added))[-len(added) :]
     return perform(materials, entries)
 
 

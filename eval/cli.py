@@ -13,6 +13,7 @@ from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, INTERRUPTED, Com
 from hippodrome.eval.commands.authoring import add_scenario_command
 from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands
+from hippodrome.eval.commands.methods import add_method_commands
 from hippodrome.eval.commands.run import add_drive_command
 from hippodrome.eval.commands.runs import add_run_commands
 from hippodrome.eval.commands.stages import add_stage_commands
@@ -70,6 +71,7 @@ def make_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", title="commands")
     add_run_commands(commands)
     add_scenario_command(commands)
+    add_method_commands(commands)
     add_gate_commands(commands)
     add_drive_command(commands)
     add_stage_commands(commands)

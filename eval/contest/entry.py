@@ -13,11 +13,13 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
 
+from hippodrome.eval.contest.process import can_conceal
 from hippodrome.eval.contest.program import ProgramLocalizer, ProgramMapper
 from hippodrome.eval.contest.stream import StreamLocalizer, StreamMapper
 from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, stem_of
 from hippodrome.eval.methods.ours import DeadReckoning, SemiMetric, Topometric, TopometricPaper
 from hippodrome.eval.methods.protocol import Describes, Localizes, Maps, MethodError, Needs
+from hippodrome.eval.results.model import Declaration
 from hippodrome.eval.rivals.rows import NoAttractor, RatSlamMethod
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.scenario import METHOD_NAME, Scenario
@@ -36,7 +38,15 @@ class Entry:
     needs: Needs
     builds_on: str | None = None  # key of the method on whose map it builds
     source: str = "hippodrome"  # where it comes from, for the report
-    isolated: bool = False  # whether it runs in a process of its own, where no truth can be reached
+    apart: bool = False  # whether it runs in a process of its own
+
+    @property
+    def declaration(self) -> Declaration:
+        """What its row says of it."""
+        base = f"the map of {self.builds_on}, " if self.builds_on is not None and self.source != "hippodrome" else ""
+        return Declaration(
+            frame=self.method.frame, given=base + self.needs.in_words(), source=self.source, isolated=self.apart and can_conceal()
+        )
 
     @property
     def does(self) -> tuple[str, ...]:
@@ -143,7 +153,7 @@ def _program(name: str, spec: MethodSpec) -> Entry:
     runner = localizer(spec) if spec.localize else mapper(spec)
     needs = Needs(road_network="road_network" in spec.needs, start_pose="start_pose" in spec.needs)
     source = f"{'stream' if spec.stream else 'exec'}:{command}"
-    return Entry(_card(name, spec.frame or "own"), runner, needs, None, source, isolated=True)
+    return Entry(_card(name, spec.frame or "own"), runner, needs, None, source, apart=True)
 
 
 def _card(label: str, frame: str) -> Method:

@@ -93,7 +93,7 @@ def perform(materials: Materials, entries: Sequence[Entry]) -> Performance:
             except HippodromeError as error:
                 rows.append(_failed(entry, drawn, str(error)))
             else:
-                rows.append(row_of(outcome, materials))
+                rows.append(row_of(outcome, materials).model_copy(update={"declaration": entry.declaration}))
                 outcomes.append(outcome)
     return Performance(rows, outcomes)
 
@@ -267,7 +267,8 @@ def _guarded(label: str, function: Callable[[], ResultT], materials: Materials) 
 def _failed(entry: Entry, drawn: Mapping[str, Drawn | str], cause: str) -> Row:
     """The row of a method without a trajectory, with the size of the map that it builds on."""
     base = drawn.get(entry.builds_on) if entry.builds_on is not None else None
-    return Row(method=entry.method.label, failure=cause, **(base.mapped.figures if isinstance(base, Drawn) else {}))
+    figures = base.mapped.figures if isinstance(base, Drawn) else {}
+    return Row(method=entry.method.label, failure=cause, declaration=entry.declaration, **figures)
 
 
 def drawn_methods(outcomes: Iterable[Outcome]) -> list[Outcome]:

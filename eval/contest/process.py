@@ -58,11 +58,27 @@ class Process:
         if pid == 0:
             if self.left_s <= 0.0:
                 self.stop(f"hung: no end after {self.limits.time_s:g} s, its limit")
-            elif (held := _group_rss_bytes(self.popen.pid)) > self.limits.memory_bytes:
+            elif (held := self.look()) > self.limits.memory_bytes:
                 self.stop(f"took {held / 1e6:.0f} MB of memory, more than its limit of {self.limits.memory_bytes / 1e6:.0f} MB")
             return self.status is not None
         self._ended(status, usage)
         return True
+
+    def look(self) -> int:
+        """Memory [bytes] that it and the processes of its group hold together now; the most that one of them held is remembered.
+
+        The kernel's figure for a process that has ended (``ru_maxrss``) begins with the memory of the one that started it.
+        """
+        held = 0
+        for entry in Path("/proc").iterdir():
+            if entry.name.isdigit():
+                with contextlib.suppress(OSError, ValueError, IndexError):
+                    fields = (entry / "stat").read_text().rpartition(")")[2].split()
+                    if int(fields[2]) == self.popen.pid:
+                        held += int(fields[21]) * resource.getpagesize()
+                        peak = 1024 * int((entry / "status").read_text().split("VmHWM:")[1].split()[0])
+                        self.peak_rss_bytes = max(peak, self.peak_rss_bytes)
+        return held
 
     def stop(self, cause: str) -> None:
         """End it and all processes of its group, and remember why."""
@@ -95,7 +111,6 @@ class Process:
     def _ended(self, status: int, usage: resource.struct_rusage) -> None:
         self.status = self.popen.returncode = os.waitstatus_to_exitcode(status)
         self.cpu_s = usage.ru_utime + usage.ru_stime
-        self.peak_rss_bytes = max(1024 * usage.ru_maxrss, self.peak_rss_bytes)
         with contextlib.suppress(ProcessLookupError, PermissionError):  # what it left behind
             os.killpg(self.popen.pid, signal.SIGKILL)
 
@@ -131,6 +146,7 @@ def started(
             raise MethodError(f"'{command[0]}' cannot be started: {error.strerror}; {cure}") from None
     _limit(popen.pid, limits)
     process = Process(popen, limits, log)
+    process.look()
     try:
         yield process
     finally:
@@ -190,18 +206,6 @@ def _limit(pid: int, limits: Limits) -> None:
         resource.prlimit(pid, resource.RLIMIT_AS, (limits.memory_bytes, limits.memory_bytes))
         resource.prlimit(pid, resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
         resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0))
-
-
-def _group_rss_bytes(group: int) -> int:
-    """Memory that all processes of a group hold together."""
-    held = 0
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            with contextlib.suppress(OSError, ValueError, IndexError):
-                fields = (entry / "stat").read_text().rpartition(")")[2].split()
-                if int(fields[2]) == group:
-                    held += int(fields[21]) * resource.getpagesize()
-    return held
 
 
 def _signal_name(number: int) -> str:

@@ -65,6 +65,7 @@ class StreamMapper:
                 steps_s.append(time.perf_counter() - began)
                 times_s.append(observation.t_s)
             finished = line.asked(pb.ToMethod(end=pb.End()), "finished").finished
+            process.look()
             line.close()
             process.wait()
         return times_s, answers, finished, Cost(process.cpu_s, process.peak_rss_bytes, np.array(steps_s))

@@ -94,8 +94,10 @@ REFINED: Final = (TOPOMETRIC_PAPER, TOPOMETRIC)  # their maps are refined, and a
 ALWAYS: Final = (*REFINED, SEMI_METRIC, DEAD_RECKONING)  # every evaluation has these rows, so thresholds can speak of them
 
 
-def method_of(label: str) -> Method:
+def method_of(label: str, frame: str | None = None) -> Method:
     """The method of a row, by the label that results files know it by.
+
+    ``frame`` is the one that the row declares; it counts for a method that the table lacks.
 
     A label that the table lacks, from a results file of another version or another program, gets a method as well: a variant of
     the known method that its label begins with (``topometric (tuned)``), and otherwise one with a frame of its own.
@@ -104,6 +106,9 @@ def method_of(label: str) -> Method:
     if label in known:
         return known[label]
     stem = stem_of(label)
+    declared = next((known for known in ALIGNMENTS if known == frame), None)
+    if declared is not None:
+        return Method(stem, label, declared, stem)
     whole = max((name for name in known if label.startswith(name)), key=len, default=None)
     if whole is None:
         return Method(stem, label, "own", stem)

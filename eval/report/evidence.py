@@ -53,6 +53,7 @@ class Layer(TimedPath):
     """A method's vertices, placed as they were for scoring; an error is None where there is no truth at a vertex's time."""
 
     name: str  # label of the method
+    frame: str | None = None  # that the method declares; None in files of older versions
     error_m: list[float | None]
     worst: list[Annotated[int, Field(ge=0)]]  # vertices with the largest errors, largest first
 
@@ -172,6 +173,7 @@ def _layer(method: Method, one: ScoredTrajectory, truth: Trajectory) -> Layer:
     errors_m[np.searchsorted(one.trajectory.t_s, one.ape.t_s)] = one.ape.errors_m
     return Layer(
         name=method.label,
+        frame=method.frame,
         **_columns(one.trajectory.t_s, placed_m),
         error_m=[None if np.isnan(error) else round(float(error), DECIMALS_M) for error in errors_m],
         worst=worst_places(errors_m),

@@ -81,12 +81,23 @@ class Latency(_Model):
     p99: float
 
 
+class Declaration(_Model):
+    """What a method says of itself, or is said of it."""
+
+    frame: str  # of its trajectory: own, network or metric
+    given: str  # what it is given, in words
+    source: str  # where it comes from: hippodrome, a class, or a command
+    isolated: bool  # whether it ran in a process of its own, with nothing of the truth within its reach
+
+
 class Row(_Model):
     """One method on one drive. A method that failed has a row too, and says why."""
 
     method: str  # label of the method, see ``eval.methods.method``
     quoted: bool = False  # copied from a paper, not measured here
     failure: str | None = None  # why it failed, if it did
+    refused: str | None = None  # why nothing vouches for its map, if nothing does: its errors are those of a guess
+    declaration: Declaration | None = None
     cpu_percent: float | None = None  # CPU time of the process, in per cent of the drive's duration
     latency_ms: Latency | None = None  # per observation of the mapping drive
     map_bytes: int | None = None  # size of the saved map

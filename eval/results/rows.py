@@ -10,6 +10,7 @@ import numpy as np
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import CognitiveMap, FloatArray, Refinement, Trajectory
 from hippodrome.eval.methods.materials import Materials, Outcome, ScoredTrajectory
+from hippodrome.eval.methods.refusal import refusal_in_a_row
 from hippodrome.eval.metrics.alignment import DegenerateAlignment
 from hippodrome.eval.metrics.map_quality import closures, matched_lane_accuracy, matched_lane_ids, score_closures
 from hippodrome.eval.metrics.trajectory import ape
@@ -30,6 +31,7 @@ def row_of(outcome: Outcome, materials: Materials) -> Row:
     return Row(
         method=outcome.method.label,
         failure=outcome.failure,
+        refused=refusal_in_a_row(outcome.refined) if outcome.refined is not None else None,
         **_errors(outcome.scored),
         **fields,
         cpu_percent=100 * outcome.cpu_s / materials.duration_s,

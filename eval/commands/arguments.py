@@ -82,7 +82,8 @@ def add_scenarios(parser: argparse.ArgumentParser, several: bool) -> None:
     """The scenarios, and what may be replaced in them."""
     parser.add_argument(
         "scenarios", type=Path, nargs="+" if several else 1, metavar="SCENARIO.yaml",
-        help="a scenario's file; `hippodrome scenario new` writes one, docs/scenarios.md lists its keys",
+        help="a scenario's file, or the name of one that comes with hippodrome (`hippodrome scenario list`); `hippodrome "
+             "scenario new` writes one, docs/scenarios.md lists its keys",
     )  # fmt: skip
     parser.add_argument(
         "--network", type=Path, metavar="NET",

@@ -8,6 +8,7 @@ from pathlib import Path
 from sysconfig import get_path
 from typing import Any, Final
 
+from hippodrome.eval.files.shipped import shipped
 from hippodrome.sim.scenario import Scenario, load_scenario
 from hippodrome.sim.yaml_file import ScenarioError
 
@@ -18,13 +19,14 @@ def read_scenario(path: Path, network: Path | None = None, seed: int | None = No
     """The scenario in a file.
 
     Args:
-        path: The file.
+        path: The file, or the name of a scenario that comes with the package, like ``towns/rural``.
         network: Road network that replaces the scenario's own.
         seed: Seed that replaces the scenario's own.
 
     Raises:
         HippodromeError: The file or its network cannot be used.
     """
+    path = shipped(path)
     scenario = load_scenario(path, network, seed)
     named = scenario.town.network
     if named is None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from hippodrome._files import write_atomically
 from hippodrome.core.mapping.mapper import MapperConfig
+from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import AttractorStates, CognitiveMap, HippodromeError, Observation, Trajectory
 from hippodrome.eval.methods.method import NO_ATTRACTOR, RATSLAM
 from hippodrome.eval.methods.ours import mapped_of
@@ -82,7 +83,11 @@ class NoAttractor:
         found = mapped_of(map_without_attractor(observations, self._config)[0])
         cognitive_map = found.cognitive_map
         assert cognitive_map is not None
-        return replace(found, save=lambda path: save_map(path, cognitive_map, {"method": NO_ATTRACTOR.label}))
+        at_s, poses = found.trajectory.t_s, found.trajectory.poses
+        wrapped = Trajectory(
+            at_s, interpolate(at_s, poses, at_s)
+        )  # turns its headings by a rounding, as its results always had it
+        return replace(found, trajectory=wrapped, save=lambda path: save_map(path, cognitive_map, {"method": NO_ATTRACTOR.label}))
 
 
 def _held(trajectory: Trajectory, first_s: float, last_s: float) -> Trajectory:

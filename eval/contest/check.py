@@ -88,6 +88,11 @@ def short_scenario() -> Scenario:
 def findings(entry: Entry, materials: Materials, once: Performance, again: Performance) -> Iterator[Finding]:
     """The verdict on two runs of the same method."""
     row = once.rows[-1]
+    if row.places is not None and entry.does == ("describe",):
+        yield Finding(True, f"describe: {100.0 * row.places.best_is_right:.0f} % of {row.places.mapped} mapped queries are right")
+        yield Finding(row.places == again.rows[-1].places, "again: the same answers, if this is ok")
+        yield from _cost(row, materials)
+        return
     mine = [one for one in once.outcomes if one.method == entry.method]
     if not mine:
         yield Finding(False, f"map: {row.failure}")

@@ -9,7 +9,7 @@ import tempfile
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import process_time
 from typing import Final, TypeVar
@@ -20,6 +20,7 @@ from hippodrome._files import write_atomically
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, Trajectory
 from hippodrome.eval.contest.entry import Entry
+from hippodrome.eval.contest.places import recognise
 from hippodrome.eval.methods.feed import Feed
 from hippodrome.eval.methods.materials import Materials, Outcome, score_trajectory, true_start
 from hippodrome.eval.methods.method import SEMI_METRIC
@@ -39,8 +40,8 @@ from hippodrome.eval.methods.stages import Localization
 from hippodrome.eval.metrics.association import check_trajectory
 from hippodrome.eval.metrics.localization import score_localization
 from hippodrome.eval.metrics.trajectory import path_length_m
-from hippodrome.eval.results.model import Row
-from hippodrome.eval.results.rows import row_of
+from hippodrome.eval.results.model import PlaceSummary, Row
+from hippodrome.eval.results.rows import latency, row_of
 from hippodrome.proto.codec import save_map
 from hippodrome.sim.recording import Recording
 
@@ -79,6 +80,8 @@ def perform(materials: Materials, entries: Sequence[Entry]) -> Performance:
         folders = {entry.method.key: Path(stack.enter_context(tempfile.TemporaryDirectory())) for entry in entries}
         drawn: dict[str, Drawn | str] = {}
         for entry in _bases_first(entries):
+            if entry.does == ("describe",):
+                continue
             try:
                 drawn[entry.method.key] = _draw(entry, materials, drawn, folders[entry.method.key])
             except HippodromeError as error:
@@ -88,14 +91,43 @@ def perform(materials: Materials, entries: Sequence[Entry]) -> Performance:
         at_s = _scored_times(materials, drawn.get(SEMI_METRIC.key))
         rows, outcomes = [], []
         for entry in entries:
+            if entry.does == ("describe",):
+                rows.append(_description_row(entry, materials))
+                continue
             try:
                 outcome = _outcome(entry, materials, drawn[entry.method.key], at_s, folders[entry.method.key])
+                said = {"declaration": entry.declaration, "places": _places(entry, materials)}
             except HippodromeError as error:
                 rows.append(_failed(entry, drawn, str(error)))
             else:
-                rows.append(row_of(outcome, materials).model_copy(update={"declaration": entry.declaration}))
+                rows.append(row_of(outcome, materials).model_copy(update=said))
                 outcomes.append(outcome)
     return Performance(rows, outcomes)
+
+
+def _description_row(entry: Entry, materials: Materials) -> Row:
+    """The row of a method that only describes frames."""
+    label = entry.method.label
+    try:
+        score, cpu_s, step_s = _guarded(label, lambda: recognise(label, entry.runner.describe, materials), materials)
+    except HippodromeError as error:
+        return Row(method=label, failure=str(error), declaration=entry.declaration)
+    drives_s = materials.duration_s + float(materials.drive.samples.t_s[-1])
+    return Row(
+        method=label,
+        declaration=entry.declaration,
+        places=PlaceSummary(**asdict(score)),
+        cpu_percent=100 * cpu_s / drives_s,
+        latency_ms=latency(step_s),
+    )
+
+
+def _places(entry: Entry, materials: Materials) -> PlaceSummary | None:
+    """Place recognition of a method that does other things, too. Raises MethodError if that fails."""
+    if "describe" not in entry.does:
+        return None
+    label = entry.method.label
+    return PlaceSummary(**asdict(_guarded(label, lambda: recognise(label, entry.runner.describe, materials), materials)[0]))
 
 
 def _bases_first(entries: Sequence[Entry]) -> list[Entry]:

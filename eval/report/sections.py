@@ -112,6 +112,9 @@ def _headline(scenario: ScenarioResult) -> Html:
 
 
 def _tile(row: Row) -> Html:
+    if row.ape is None and row.places is not None:
+        right = element("strong", f"{100.0 * row.places.best_is_right:.0f} %")
+        return element("div", element("span", row.method), right, element("small", "of the places right"), class_="figure-tile")
     if row.ape is None:
         return element("div", element("span", row.method), element("strong", "failed", class_="bad"), class_="figure-tile")
     if row.refused is not None:

@@ -161,7 +161,7 @@ def _ape(row: Row | None) -> Child:
     if row is None:
         return NONE
     if row.ape is None:
-        return element("span", "FAILED", class_="bad")
+        return NONE if row.places is not None else element("span", "FAILED", class_="bad")
     return element("span", f"REFUSED ({row.ape.mean_m:.2f})", class_="bad") if row.refused else f"{row.ape.mean_m:.2f}"
 
 

@@ -74,6 +74,17 @@ class LocalizationSummary(_Model):
     total: int | None = None
 
 
+class PlaceSummary(_Model):
+    """The figures of a ``PlaceScore``: place recognition alone."""
+
+    definition: str
+    places: int
+    queries: int
+    mapped: int
+    best_is_right: float
+    recall: float
+
+
 class Latency(_Model):
     """Time from handing a method a frame or a reading until it is done with it [ms]."""
 
@@ -113,6 +124,7 @@ class Row(_Model):
     rpe: ErrorSummary | None = None  # between consecutive vertices
     rpe_20m: ErrorSummary | None = None
     localization: LocalizationSummary | None = None
+    places: PlaceSummary | None = None
 
 
 class ScenarioResult(_Model):

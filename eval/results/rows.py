@@ -35,7 +35,7 @@ def row_of(outcome: Outcome, materials: Materials) -> Row:
         **_errors(outcome.scored),
         **fields,
         cpu_percent=100 * outcome.cpu_s / materials.duration_s,
-        latency_ms=_latency(outcome.step_s),
+        latency_ms=latency(outcome.step_s),
         peak_rss_bytes=outcome.peak_rss_bytes,
         map_bytes=outcome.map_bytes,
         covered=outcome.covered,
@@ -53,7 +53,8 @@ def _fitted(trajectory: Trajectory, truth: Trajectory, fit: Literal["se2", "sim2
         return None
 
 
-def _latency(step_s: FloatArray) -> Latency | None:
+def latency(step_s: FloatArray) -> Latency | None:
+    """Median and 99th percentile of times (N,) in s; None if there are none."""
     if len(step_s) == 0:
         return None
     return Latency(median=1e3 * float(np.median(step_s)), p99=1e3 * float(np.percentile(step_s, 99.0)))

@@ -131,6 +131,8 @@ MAPPING_COLUMNS = (
     Column("RPE (m)", lambda row: _mean(row.rpe)),
     Column("RPE 20 m (m)", lambda row: _mean(row.rpe_20m)),
     Column("Latency (ms)", _latency),
+    Column("Places right (%)", lambda row: NONE if row.places is None else _percent(row.places.best_is_right)),
+    Column("Places recalled (%)", lambda row: NONE if row.places is None else _percent(row.places.recall)),
     Column("Covered (%)", _covered),
 )
 
@@ -235,6 +237,8 @@ def definitions(rows: Sequence[Row]) -> list[str]:
         ):
             if field is not None:
                 methods_of.setdefault((title, field.definition), []).append(_method(row))
+        if row.places is not None:
+            methods_of.setdefault(("Places", row.places.definition), []).append(_method(row))
         if row.localization is not None:
             methods_of.setdefault(("Localization", row.localization.definition), []).append(_method(row))
     return [f"{title} ({', '.join(methods)}): {definition}" for (title, definition), methods in sorted(methods_of.items())]

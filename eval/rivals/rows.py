@@ -84,9 +84,7 @@ class NoAttractor:
         cognitive_map = found.cognitive_map
         assert cognitive_map is not None
         at_s, poses = found.trajectory.t_s, found.trajectory.poses
-        wrapped = Trajectory(
-            at_s, interpolate(at_s, poses, at_s)
-        )  # turns its headings by a rounding, as its results always had it
+        wrapped = Trajectory(at_s, interpolate(at_s, poses, at_s))  # rounds its headings, as ever
         return replace(found, trajectory=wrapped, save=lambda path: save_map(path, cognitive_map, {"method": NO_ATTRACTOR.label}))
 
 

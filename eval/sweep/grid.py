@@ -107,7 +107,7 @@ def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
     for part in parents:
         if part == "noise" and isinstance(place[part], str):  # a level's name stands for its values
             place[part] = NOISE_LEVELS[place[part]].model_dump()
-        place = place.get(part)
+        place = place.setdefault(part, {}) if parents[0] == "methods" and part == "config" else place.get(part)
         if not isinstance(place, dict):
             raise SweepError(f"--set {key}: '{part}' has no keys of its own; see docs/scenarios.md")
     place[last] = value

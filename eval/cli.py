@@ -11,6 +11,7 @@ from typing import Any
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, INTERRUPTED, Command, HelpLayout, print_help
 from hippodrome.eval.commands.authoring import add_scenario_command
+from hippodrome.eval.commands.board import add_board_command
 from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands
 from hippodrome.eval.commands.methods import add_method_commands
@@ -72,6 +73,7 @@ def make_parser() -> argparse.ArgumentParser:
     add_run_commands(commands)
     add_scenario_command(commands)
     add_method_commands(commands)
+    add_board_command(commands)
     add_gate_commands(commands)
     add_drive_command(commands)
     add_stage_commands(commands)

@@ -37,7 +37,7 @@ CORE_ROOMS = {
 # The rooms of eval from the lowest to the highest: each may import only those before it.
 EVAL_ROOMS = (
     "metrics", "files", "methods", "results", "pool", "reuse", "figures", "report", "rivals/ratslam", "rivals/orbslam3",
-    "rivals", "contest", "evaluate", "run", "authoring", "gate", "sweep", "trials/stress", "trials/robustness",
+    "rivals", "contest", "evaluate", "run", "authoring", "gate", "board", "sweep", "trials/stress", "trials/robustness",
     "trials/rivals", "exchange/drives", "exchange/readers", "exchange/formats", "exchange", "real", "commands", "cli",
 )  # fmt: skip
 CORE_PACKAGES = {"cv2", "numba", "numpy", "scipy"}

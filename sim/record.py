@@ -81,6 +81,9 @@ class RecordingPlan:
         }
 
     def folder(self) -> Path:
+        """Where the recording is, or will be; a drive that was recorded elsewhere stays where it is."""
+        if self.drive_spec.recording is not None:
+            return self.drive_spec.recording
         key = hashlib.sha256(json.dumps(self.content(), sort_keys=True).encode()).hexdigest()[:16]
         return self.root / "recordings" / f"{self.scenario.name}-{self.role}-{key}"
 

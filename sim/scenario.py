@@ -28,12 +28,21 @@ MethodName = Annotated[str, Field(pattern=METHOD_NAME)]
 
 
 class DriveSpec(Spec):
-    """One drive through the town: where, among whom, in which light."""
+    """One drive through the town: where, among whom, in which light; or a recording of a drive that was made elsewhere."""
 
     tour: TourSpec
+    recording: Path | None = None  # folder of a recording, as `hippodrome import` writes, in place of the simulated drive
     traffic: TrafficSpec = TrafficSpec()
     ego: EgoSpec = EgoSpec()
     conditions: Conditions = Conditions()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _recorded(cls, data: Any) -> Any:
+        """A drive that was recorded elsewhere needs no tour."""
+        if isinstance(data, dict) and data.get("recording") is not None:
+            return {"tour": {"length_m": 3600}, **data}
+        return data
 
 
 class Thresholds(Spec):
@@ -95,4 +104,12 @@ def load_scenario(path: Path, network: Path | None = None, seed: int | None = No
         town = TownSpec(network=network.resolve())
     elif town.network is not None:
         town = town.model_copy(update={"network": (path.parent / town.network).resolve()})
-    return scenario.model_copy(update={"town": town, "seed": scenario.seed if seed is None else seed})
+    drives = {role: _placed(getattr(scenario, role), path.parent) for role in ("mapping", "localization")}
+    return scenario.model_copy(update={"town": town, "seed": scenario.seed if seed is None else seed, **drives})
+
+
+def _placed(drive: DriveSpec, folder: Path) -> DriveSpec:
+    """The drive with its recording as a whole path; a relative one is relative to ``folder``."""
+    if drive.recording is None:
+        return drive
+    return drive.model_copy(update={"recording": (folder / drive.recording).resolve()})

@@ -44,6 +44,7 @@ from hippodrome.eval.results.model import PlaceSummary, Row
 from hippodrome.eval.results.rows import latency, row_of
 from hippodrome.proto.codec import save_map
 from hippodrome.sim.recording import Recording
+from hippodrome.sim.render.camera import CameraSpec
 
 ResultT = TypeVar("ResultT")
 SPACING_M: Final = 5.0  # between two scored samples where there is no semi-metric map: as far apart as its vertices are
@@ -186,7 +187,7 @@ def _save(entry: Entry, mapped: Mapped, materials: Materials) -> int | None:
 def _given(entry: Entry, materials: Materials, drive: Recording, folder: Path, base: Mapped | None) -> Given:
     scenario, needs = materials.scenario, entry.needs
     return Given(
-        camera=scenario.camera,
+        camera=_camera(scenario.camera, drive),
         rate_hz=scenario.odometry_rate_hz,
         duration_s=float(drive.samples.t_s[-1]),
         seed=scenario.seed,
@@ -196,6 +197,12 @@ def _given(entry: Entry, materials: Materials, drive: Recording, folder: Path, b
         base=base,
         concealed=tuple(folder for folder in materials.truth_folders if folder.is_dir()),
     )
+
+
+def _camera(camera: CameraSpec, drive: Recording) -> CameraSpec:
+    """The camera of a drive: the scenario's, or what is known of that of a drive that was recorded elsewhere."""
+    known = getattr(drive, "manifest", {}).get("camera", {})
+    return camera.model_copy(update={name: value for name, value in known.items() if name in CameraSpec.model_fields})
 
 
 def _scored_times(materials: Materials, semi_metric: Drawn | str | None) -> FloatArray:

@@ -75,6 +75,9 @@ def effective_configuration(scenario: Scenario) -> dict[str, Any]:
     values: dict[str, Any] = json.loads(scenario.model_dump_json())  # JSON has no infinity: such a limit becomes null
     if scenario.town.network is not None:
         values["town"]["network"] = portable(scenario.town.network)
+    for role in ("mapping", "localization"):
+        if values[role]["recording"] is not None:
+            values[role]["recording"] = Path(values[role]["recording"]).name
     return values
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hippodrome.core.refinement.refine import RefineConfig
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import CognitiveMap, FloatArray, StartPose, Trajectory
+from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, StartPose, Trajectory
 from hippodrome.eval.files.scenarios import effective_configuration
 from hippodrome.eval.methods.method import Method, RefineMode
 from hippodrome.eval.methods.protocol import Mapped
@@ -61,9 +61,21 @@ def gather(scenario: Scenario, out: Path) -> Materials:
     town = mapping.town()
     rng = np.random.default_rng([scenario.seed, 2])
     roads = with_survey_error(town.network, scenario.self_motion_noise.survey_error_m, rng)
+    recordings = finish(mapping), finish(drive)
+    for recording in recordings:
+        _require_truth(recording)
     folder = out / scenario.name
     folder.mkdir(parents=True, exist_ok=True)
-    return Materials(scenario, folder, town, roads, finish(mapping), finish(drive))
+    return Materials(scenario, folder, town, roads, *recordings)
+
+
+def _require_truth(recording: Recording) -> None:
+    """Raise HippodromeError unless the truth of a recording is known at all its steps, in the road network's frame."""
+    cure = "import it with --truth and --truth-frame network, or use `hippodrome run`, which needs no truth"
+    if not np.isfinite(recording.samples.poses_m).all():
+        raise HippodromeError(f"{recording.folder}: its truth is not known everywhere, so no method can be scored on it; {cure}")
+    if recording.manifest.get("truth_frame", "network") != "network":
+        raise HippodromeError(f"{recording.folder}: its truth lies in a frame of its own, not in the road network's; {cure}")
 
 
 def true_start(drive: Recording) -> StartPose:

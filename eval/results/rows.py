@@ -88,7 +88,7 @@ def _errors(scored: ScoredTrajectory) -> dict[str, Any]:
 
 def _lane_figures(cognitive_map: CognitiveMap, recording: Recording) -> dict[str, Any] | None:
     """How many vertices are on the lane that was driven at their time; None if the map was not matched to lanes."""
-    if cognitive_map.road_match is None:
+    if cognitive_map.road_match is None or not any(recording.samples.lane_ids):  # only the simulator knows the lane
         return None
     samples = recording.samples
     steps = np.clip(np.searchsorted(samples.t_s, cognitive_map.t_s), 0, len(samples.t_s) - 1)

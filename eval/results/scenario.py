@@ -30,7 +30,7 @@ def scenario_result(materials: Materials, rows: Sequence[Row], outcomes: Sequenc
         frames=materials.mapping.frame_count,
         duration_s=materials.duration_s,
         rows=tuple(rows),
-        tours={role: recording.manifest["tour"] for role, recording in recordings.items()},
+        tours={role: recording.manifest.get("tour") for role, recording in recordings.items()},
         town_notes=list(materials.town.notes),
         configuration=effective_configuration(scenario),
         timings=_timings(outcomes),

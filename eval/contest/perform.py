@@ -6,20 +6,19 @@ A method that raises, crashes or answers with no answer has a row that says so, 
 from __future__ import annotations
 
 import tempfile
-import traceback
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import process_time
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 
-from hippodrome._files import write_atomically
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, Trajectory
 from hippodrome.eval.contest.entry import Entry
+from hippodrome.eval.contest.guard import guarded
 from hippodrome.eval.contest.places import recognise
 from hippodrome.eval.methods.feed import Feed
 from hippodrome.eval.methods.materials import Materials, Outcome, score_trajectory, true_start
@@ -46,10 +45,8 @@ from hippodrome.proto.codec import save_map
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.render.camera import CameraSpec
 
-ResultT = TypeVar("ResultT")
 SPACING_M: Final = 5.0  # between two scored samples where there is no semi-metric map: as far apart as its vertices are
 LEAST_COVERED: Final = 0.5  # share of the drive that a trajectory must cover: with less, its errors say little about the drive
-INTERRUPTED: Final = 130  # exit status of a worker that is interrupted, which is no fault of the method
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +107,7 @@ def _description_row(entry: Entry, materials: Materials) -> Row:
     """The row of a method that only describes frames."""
     label = entry.method.label
     try:
-        score, cpu_s, step_s = _guarded(label, lambda: recognise(label, entry.runner.describe, materials), materials)
+        score, cpu_s, step_s = guarded(label, lambda: recognise(label, entry.runner.describe, materials), materials)
     except HippodromeError as error:
         return Row(method=label, failure=str(error), declaration=entry.declaration)
     drives_s = materials.duration_s + float(materials.drive.samples.t_s[-1])
@@ -128,7 +125,7 @@ def _places(entry: Entry, materials: Materials) -> PlaceSummary | None:
     if "describe" not in entry.does:
         return None
     label = entry.method.label
-    return PlaceSummary(**asdict(_guarded(label, lambda: recognise(label, entry.runner.describe, materials), materials)[0]))
+    return PlaceSummary(**asdict(guarded(label, lambda: recognise(label, entry.runner.describe, materials), materials)[0]))
 
 
 def _bases_first(entries: Sequence[Entry]) -> list[Entry]:
@@ -158,14 +155,14 @@ def _draw(entry: Entry, materials: Materials, drawn: Mapping[str, Drawn | str], 
         return replace(base, cpu_s=0.0, whole_s=base.whole_s, step_s=np.zeros(0), map_bytes=None)
     given = _given(entry, materials, materials.mapping, folder, base.mapped if base else None)
     if (warm_up := getattr(entry.runner, "warm_up", None)) is not None:
-        _guarded(label, warm_up, materials)
+        guarded(label, warm_up, materials)
     feed = Feed(materials.mapping.observations() if entry.needs.camera else materials.mapping.self_motion())
     began = process_time()
-    mapped = _guarded(label, lambda: as_mapped(entry.runner.map(iter(feed), given), label), materials)
+    mapped = guarded(label, lambda: as_mapped(entry.runner.map(iter(feed), given), label), materials)
     cpu_s = process_time() - began - feed.decoding_s
     feed.settle()
     check_trajectory(mapped.trajectory, label)
-    map_bytes = _guarded(label, lambda: _save(entry, mapped, materials), materials)
+    map_bytes = guarded(label, lambda: _save(entry, mapped, materials), materials)
     step_s = feed.step_s
     if (cost := mapped.cost) is not None:
         cpu_s, step_s = cost.cpu_s, np.zeros(0) if cost.step_s is None else cost.step_s
@@ -265,7 +262,7 @@ def _localize(entry: Entry, materials: Materials, mapped: Mapped, folder: Path) 
     label, drive = entry.method.label, materials.drive
     given = replace(_given(entry, materials, drive, folder, None), mapped=mapped)
     feed = Feed(drive.observations() if entry.needs.camera else drive.self_motion())
-    estimates, cost = _guarded(label, lambda: _answers(label, entry.runner.localize(iter(feed), given)), materials)
+    estimates, cost = guarded(label, lambda: _answers(label, entry.runner.localize(iter(feed), given)), materials)
     feed.settle()
     times_s = drive.samples.t_s
     if len(estimates) != len(times_s):
@@ -282,25 +279,6 @@ def _answers(label: str, answers: Localizing) -> tuple[list[LocalizationEstimate
     if isinstance(answers, Localized):
         return [as_estimate(answer, label) for answer in answers.answers], answers.cost
     return [as_estimate(answer, label) for answer in answers], None
-
-
-def _guarded(label: str, function: Callable[[], ResultT], materials: Materials) -> ResultT:
-    """What a method's function returns. What it raises becomes a MethodError, and the traceback a file beside the results."""
-    try:
-        return function()
-    except (HippodromeError, KeyboardInterrupt):
-        raise
-    except SystemExit as error:
-        if error.code == INTERRUPTED:
-            raise
-        raise MethodError(f"it left the process with status {error.code}") from error
-    except BaseException as error:
-        log = materials.folder / f"{label.replace(' ', '-')}-crash.txt"
-        write_atomically(log, traceback.format_exc().encode())
-        last = traceback.extract_tb(error.__traceback__)[-1]
-        text = " ".join(str(error).split())[:200]
-        place = f"{Path(last.filename).name}, line {last.lineno}"
-        raise MethodError(f"crashed: {type(error).__name__}: {text} ({place}); its traceback is in {log.name}") from error
 
 
 def _failed(entry: Entry, drawn: Mapping[str, Drawn | str], cause: str) -> Row:

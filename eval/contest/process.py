@@ -183,7 +183,7 @@ def can_conceal() -> bool:
     """Whether this system lets a program have a mount namespace of its own, in which folders can be covered."""
     if shutil.which("unshare") is None or shutil.which("mount") is None:
         return False
-    trial = ["unshare", "--user", "--map-root-user", "--mount", "mount", "-t", "tmpfs", "none", "/mnt"]
+    trial = ["unshare", "--user", "--map-root-user", "--mount", "mount", "-t", "tmpfs", "none", "/tmp"]
     try:
         return subprocess.run(trial, capture_output=True, timeout=10.0, check=False).returncode == 0
     except (OSError, subprocess.TimeoutExpired):

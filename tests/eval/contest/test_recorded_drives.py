@@ -39,6 +39,7 @@ def test_a_recording_is_evaluated_like_a_simulated_drive(recorded, run, tmp_path
     before = {row.method: row.ape.mean_m for row in result_of(read_results(run.out / "results.json"), "hamlet").rows}
     assert [row.ape.mean_m for row in rows] == pytest.approx([before[row.method] for row in rows], abs=1e-6)
     assert effective_configuration(recorded)["mapping"]["recording"] == "mapping"
+    assert "recording" not in effective_configuration(read_scenario(run.scenario))["mapping"]  # baselines go on comparing
 
 
 def test_a_drive_without_truth_or_in_another_frame_is_refused_with_a_cure(run):

@@ -42,7 +42,7 @@ def draw_scenario(
     draw_methods(materials, scored)
     for method, outcome in localized.items():
         _draw_localized(materials, method, outcome)
-    if with_networks := [outcome for outcome in localized.values() if outcome.refined is not None]:
+    if with_networks := [outcome for outcome in localized.values() if _has_networks(outcome)]:
         _draw_neurodynamics(materials, with_networks[-1])
 
 
@@ -73,6 +73,11 @@ def _draw_localized(materials: Materials, method: Method, outcome: Outcome) -> N
                    f"{name}: {method.label}, APE on the map")  # fmt: skip
     draw_localization_error(folder / f"{method.stem}-localization.png", localized.t_s, localized.errors_m,
                             localized.localized, f"{name}: localization in the map '{method.label}'")  # fmt: skip
+
+
+def _has_networks(outcome: Outcome) -> bool:
+    """Whether the localizer's answers show the states of grid cells, as ours do."""
+    return outcome.localization is not None and all(len(one.grid_phase_rad) for one in outcome.localization.estimates)
 
 
 def _draw_neurodynamics(materials: Materials, outcome: Outcome) -> None:

@@ -66,10 +66,6 @@ def fairness_rows(rows: Iterable[Row]) -> list[list[str]]:
             lines.setdefault(name, [name, *GIVEN[name]])
         elif (said := row.declaration) is not None:
             where = ISOLATED if said.isolated else APART if said.source.startswith(("exec:", "stream:")) else TRUSTED
-            lines[row.method] = [
-                row.method,
-                said.given,
-                "-" if row.ape is None and row.places is not None else FRAMES.get(said.frame, said.frame),
-                where,
-            ]
+            frame = "-" if row.ape is None and row.places is not None else FRAMES.get(said.frame, said.frame)
+            lines[row.method] = [row.method, said.given, frame, where]
     return list(lines.values())

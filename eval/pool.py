@@ -28,11 +28,11 @@ ResultT = TypeVar("ResultT")
 
 @dataclass(slots=True)
 class ProgressLines:
-    """What a run says line by line where there is no terminal: each stage, at its beginning and at each quarter of it."""
+    """What a run says line by line where there is no terminal: each stage, at each quarter of it."""
 
     stage: str
     wanted: bool
-    said: int = -1  # quarters
+    said: int = 0  # quarters: a stage that is refused at once says nothing but why
 
     def say(self, done: int, total: int) -> None:
         """Print a line to standard error if another quarter of the tasks is done."""

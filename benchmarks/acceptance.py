@@ -2,16 +2,16 @@
 
 Drives through generated towns, without frames, and parts of them of several lengths are offered their own town and, as controls
 that must be refused, another town of the same kind, their mirror image in their own town, and their own town without the streets
-that they drove. ``--networks`` adds drives through other networks; with two or more of them, each drive is offered the next one's.
+that they drove. ``--networks`` adds drives through other networks; each drive is offered the next one's.
 
     python -m benchmarks.acceptance --seeds 3
     python -m benchmarks.acceptance --seeds 1 --networks a.net.xml b.net.xml
 
 A row of the table is one kind of offer at one length. *Accepted* is the share of samples that are vouched for, *wrong* the share
 that is vouched for and 20 m or more off the true place (of a control: all that is vouched for), *some wrong* the number of drives
-with any of that. Below, the evidence by which segments are accepted, as a curve (ROC): for each threshold, the share of the segments
-on the right road that have as much, and of those that are not. The logistic fit to them is the probability that a segment is
-right.
+with any of that. Below, the evidence by which segments are accepted, as a curve (ROC): for each threshold, the share of the
+segments on the right road that have as much, and of those that are not. The logistic fit to them is the probability that a
+segment is right.
 """
 
 from __future__ import annotations
@@ -102,11 +102,14 @@ def mirrored(visits: Visits) -> Visits:
     return replace(visits, motion=visits.motion * [1.0, -1.0, -1.0])
 
 
-def without_driven(drive: DrivenRoads) -> RoadNetwork:
-    """The network without the streets, in both directions, that were driven."""
+def without_driven(drive: DrivenRoads) -> RoadNetwork | None:
+    """The network without the streets, in both directions, that were driven; None if nothing is left of it."""
     near = KDTree(_dense(drive.poses_m)).query(drive.network.points_m, distance_upper_bound=DRIVEN_M)[0] < DRIVEN_M
     share = np.add.reduceat(near.astype(float), drive.network.point_start[:-1]) / np.diff(drive.network.point_start)
-    return without_roads(drive.network, np.unique(drive.network.lane_edge[share > 0.5]).tolist())
+    driven = np.unique(drive.network.lane_edge[share > 0.5])
+    if np.all(drive.network.is_internal[~np.isin(drive.network.lane_edge, driven)]):
+        return None
+    return without_roads(drive.network, driven.tolist())
 
 
 def _dense(poses_m: FloatArray) -> FloatArray:
@@ -145,9 +148,9 @@ def offers(drive: DrivenRoads, elsewhere: RoadNetwork | None, rng: np.random.Gen
         part = part_of(drive, int(rng.integers(0, total - count + 1)), count)
         yield offer("own", keyframes, part.visits, part.network, part.poses_m)
         yield offer("mirrored", keyframes, mirrored(part.visits), part.network, None)
-        yield offer("removed", keyframes, part.visits, without_driven(part), None)
-        if elsewhere is not None:
-            yield offer("foreign", keyframes, part.visits, elsewhere, None)
+        for kind, network in (("removed", without_driven(part)), ("foreign", elsewhere)):
+            if network is not None:
+                yield offer(kind, keyframes, part.visits, network, None)
 
 
 def print_table(found: list[Offer]) -> None:
@@ -155,14 +158,14 @@ def print_table(found: list[Offer]) -> None:
     groups: dict[tuple[str, int], list[Offer]] = defaultdict(list)
     for one in found:
         groups[one.kind, one.keyframes].append(one)
-    print(
-        f"{'offered':9} {'keyframes':>9} {'drives':>6} {'accepted':>8} {'refused whole':>13} {'wrong':>7} {'some wrong':>10} {'CPU s':>6}"
-    )
+    heads = ("keyframes", "drives", "accepted", "refused whole", "wrong", "some wrong", "CPU s")
+    print(f"{'offered':9}" + "".join(f"{head:>15}" for head in heads))
     for (kind, keyframes), own in sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] or 10**6)):
-        refused = sum(one.accepted == 0.0 for one in own)
+        accepted, wrong, seconds = (np.array([getattr(one, name) for one in own]) for name in ("accepted", "wrong", "seconds"))
+        counts = (np.sum(accepted == 0.0), np.sum(wrong > 0.0))
         print(
-            f"{kind:9} {keyframes or 'whole':>9} {len(own):6} {np.mean([o.accepted for o in own]):8.3f} {refused:13} "
-            f"{np.mean([o.wrong for o in own]):7.4f} {sum(o.wrong > 0.0 for o in own):10} {np.mean([o.seconds for o in own]):6.2f}"
+            f"{kind:9}{keyframes or 'whole':>15}{len(own):15}{accepted.mean():15.3f}{counts[0]:15}{wrong.mean():15.4f}{counts[1]:15}"
+            f"{seconds.mean():15.2f}"
         )
 
 

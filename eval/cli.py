@@ -9,9 +9,11 @@ from typing import Any
 
 from hippodrome.eval.commands.arguments import Command, HelpLayout, print_help
 from hippodrome.eval.commands.authoring import add_scenario_command
+from hippodrome.eval.commands.board import add_board_command
 from hippodrome.eval.commands.boundary import guarded, make_numba_cache
 from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands
+from hippodrome.eval.commands.methods import add_method_commands
 from hippodrome.eval.commands.run import add_drive_command
 from hippodrome.eval.commands.runs import add_run_commands
 from hippodrome.eval.commands.stages import add_stage_commands
@@ -67,6 +69,8 @@ def make_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", title="commands")
     add_run_commands(commands)
     add_scenario_command(commands)
+    add_method_commands(commands)
+    add_board_command(commands)
     add_gate_commands(commands)
     add_drive_command(commands)
     add_stage_commands(commands)

@@ -31,6 +31,22 @@ TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
 
 
+@dataclass(slots=True)
+class ProgressLines:
+    """What a run says line by line where there is no terminal: each stage, at each quarter of it."""
+
+    stage: str
+    wanted: bool
+    said: int = 0  # quarters: a stage that is refused at once says nothing but why
+
+    def say(self, done: int, total: int) -> None:
+        """Print a line to standard error if another quarter of the tasks is done."""
+        quarters = 4 * done // max(total, 1)
+        if self.wanted and quarters > self.said:
+            self.said = quarters
+            print(f"{self.stage}: {done} of {total} done", file=sys.stderr, flush=True)
+
+
 @dataclass(frozen=True, slots=True)
 class Workers:
     """A pool of processes and the progress display that goes with it."""
@@ -63,6 +79,7 @@ class Workers:
             HippodromeError: A process died, or what a task raised.
         """
         bar = self.progress.add_task(stage, total=sum(weight(item) for item in tasks))
+        lines = ProgressLines(stage, self.progress.disable)
         futures = {self.executor.submit(perform, task, item): weight(item) for item in tasks}
         pending = set(futures)
         try:
@@ -76,6 +93,7 @@ class Workers:
                         futures[another] = weight(item)
                         pending.add(another)
                 self.progress.update(bar, total=sum(futures.values()))
+                lines.say(sum(future.done() for future in futures), len(futures))
             return [future.result() for future in futures]
         except BrokenProcessPool:
             raise HippodromeError(

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.contest.entry import Added, entries_of, with_methods
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.pool import Workers, worker_pool
@@ -30,7 +31,9 @@ from hippodrome.sim.scenario import Scenario
 RESULTS = "results.json"
 
 
-def evaluate(paths: Sequence[Path], network: Path | None, seed: int | None, workers: int, out: Path) -> bool:
+def evaluate(
+    paths: Sequence[Path], network: Path | None, seed: int | None, workers: int, out: Path, methods: Sequence[Added] = ()
+) -> bool:
     """Evaluate scenarios and print their tables. Returns whether all their thresholds hold.
 
     Args:
@@ -39,16 +42,19 @@ def evaluate(paths: Sequence[Path], network: Path | None, seed: int | None, work
         seed: Seed that replaces the scenarios' own.
         workers: Number of processes.
         out: Folder for all files.
+        methods: Methods that take part beside ours and those that a scenario names.
 
     Raises:
-        HippodromeError: A scenario or its network cannot be used.
+        HippodromeError: A scenario, its network or a method cannot be used.
     """
-    scenarios = load_scenarios(paths, network, seed)
+    scenarios = load_scenarios(paths, network, seed, methods)
     return _report(scenarios, run_scenarios(scenarios, workers, out), out)
 
 
 def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path) -> Results:
     """Evaluate scenarios and write ``results.json``, tables, figures and report into ``out``. Raises HippodromeError."""
+    for scenario in scenarios:
+        entries_of(scenario)  # what cannot be loaded is said before anything is simulated
     require_gl()
     plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
     with worker_pool(workers) as pool:
@@ -73,9 +79,15 @@ def render(paths: Sequence[Path], network: Path | None, seed: int | None, worker
         print(plan.folder())
 
 
-def load_scenarios(paths: Sequence[Path], network: Path | None, seed: int | None) -> list[Scenario]:
-    """Read scenarios. Raises HippodromeError if one cannot be used, or if two have one name, as results are filed by name."""
-    scenarios = [read_scenario(path, network, seed) for path in paths]
+def load_scenarios(
+    paths: Sequence[Path], network: Path | None, seed: int | None, methods: Sequence[Added] = ()
+) -> list[Scenario]:
+    """Read scenarios, and add methods to each.
+
+    Raises:
+        HippodromeError: One cannot be used, or two have one name, as results are filed by name.
+    """
+    scenarios = [with_methods(read_scenario(path, network, seed), methods) for path in paths]
     name, times = Counter(scenario.name for scenario in scenarios).most_common(1)[0]
     if times > 1:
         raise HippodromeError(f"{times} scenarios are named '{name}': results are filed by name, so give each its own")

@@ -76,7 +76,7 @@ class RecordingPlan:
             "seed": scenario.seed,
             "town": scenario.town.model_dump(mode="json", exclude={"network"}),
             "network_sha256": sha256_of(self.town().net_file),
-            "drive": self.drive_spec.model_dump(mode="json"),
+            "drive": self.drive_spec.model_dump(mode="json", exclude={"recording"}),
             "camera": scenario.camera.model_dump(mode="json"),
             "odometry_rate_hz": scenario.odometry_rate_hz,
             "noise": scenario.self_motion_noise.model_dump(mode="json"),
@@ -86,6 +86,9 @@ class RecordingPlan:
         }
 
     def folder(self) -> Path:
+        """Where the recording is, or will be; a drive that was recorded elsewhere stays where it is."""
+        if self.drive_spec.recording is not None:
+            return self.drive_spec.recording
         key = hashlib.sha256(json.dumps(self.content(), sort_keys=True).encode()).hexdigest()[:16]
         return self.root / "recordings" / f"{self.scenario.name}-{self.role}-{key}"
 

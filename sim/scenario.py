@@ -12,6 +12,7 @@ from hippodrome.core.mapping.mapper import MapperConfig
 from hippodrome.core.refinement.refine import RefineConfig
 from hippodrome.sim.ego import EgoSpec
 from hippodrome.sim.episode import camera_divider
+from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.renamed import with_present_names
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scene.conditions import Conditions
@@ -22,14 +23,26 @@ from hippodrome.sim.town import TownSpec
 from hippodrome.sim.traffic import TrafficSpec
 from hippodrome.sim.yaml_file import load_yaml
 
+METHOD_NAME = r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$"  # of a method: it stands in tables, and files are named after it
+MethodName = Annotated[str, Field(pattern=METHOD_NAME)]
+
 
 class DriveSpec(Spec):
-    """One drive through the town: where, among whom, in which light."""
+    """One drive through the town: where, among whom, in which light; or a recording of a drive that was made elsewhere."""
 
     tour: TourSpec
+    recording: Path | None = None  # folder of a recording, as `hippodrome import` writes, in place of the simulated drive
     traffic: TrafficSpec = TrafficSpec()
     ego: EgoSpec = EgoSpec()
     conditions: Conditions = Conditions()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _recorded(cls, data: Any) -> Any:
+        """A drive that was recorded elsewhere needs no tour."""
+        if isinstance(data, dict) and data.get("recording") is not None:
+            return {"tour": {"length_m": 3600}, **data}
+        return data
 
 
 class Thresholds(Spec):
@@ -58,6 +71,7 @@ class Scenario(Spec):
     mapper: MapperConfig = MapperConfig()
     refine: RefineConfig = RefineConfig()
     localizer: LocalizerConfig = LocalizerConfig()
+    methods: dict[MethodName, MethodSpec] = Field(default_factory=dict)  # that take part beside ours, by name
     thresholds: Thresholds = Thresholds()
 
     @model_validator(mode="before")
@@ -69,6 +83,9 @@ class Scenario(Spec):
     def _rates_fit(self) -> Scenario:
         camera_divider(self.camera, self.odometry_rate_hz)
         return self
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.seed))  # equal scenarios have equal ones; the dictionary of methods has no hash
 
     @property
     def noise_name(self) -> str:
@@ -87,4 +104,12 @@ def load_scenario(path: Path, network: Path | None = None, seed: int | None = No
         town = TownSpec(network=network.resolve())
     elif town.network is not None:
         town = town.model_copy(update={"network": (path.parent / town.network).resolve()})
-    return scenario.model_copy(update={"town": town, "seed": scenario.seed if seed is None else seed})
+    drives = {role: _placed(getattr(scenario, role), path.parent) for role in ("mapping", "localization")}
+    return scenario.model_copy(update={"town": town, "seed": scenario.seed if seed is None else seed, **drives})
+
+
+def _placed(drive: DriveSpec, folder: Path) -> DriveSpec:
+    """The drive with its recording as a whole path; a relative one is relative to ``folder``."""
+    if drive.recording is None:
+        return drive
+    return drive.model_copy(update={"recording": (folder / drive.recording).resolve()})

@@ -82,7 +82,8 @@ def add_scenarios(parser: argparse.ArgumentParser, several: bool) -> None:
     """The scenarios, and what may be replaced in them."""
     parser.add_argument(
         "scenarios", type=Path, nargs="+" if several else 1, metavar="SCENARIO.yaml",
-        help="a scenario's file; `hippodrome scenario new` writes one, docs/scenarios.md lists its keys",
+        help="a scenario's file, or the name of one that comes with hippodrome (`hippodrome scenario list`); `hippodrome "
+             "scenario new` writes one, docs/scenarios.md lists its keys",
     )  # fmt: skip
     parser.add_argument(
         "--network", type=Path, metavar="NET",
@@ -97,6 +98,16 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=positive, default=os.cpu_count() or 1, metavar="N",
         help="how many processes work at once; no result depends on it (default: one for each core)",
+    )  # fmt: skip
+
+
+def add_methods(parser: argparse.ArgumentParser) -> None:
+    """Methods that take part beside ours."""
+    parser.add_argument(
+        "--method", type=_method, action="append", default=[], metavar="[NAME=]METHOD",
+        help="a method that takes part beside ours, also several times: a Python class, my_package.my_module:MyMapper; a program "
+             "that reads files, 'exec:./run.sh {sequence} {out}'; one that is fed frame by frame, 'stream:./client'; or the name "
+             "of an installed one; docs/methods.md shows each (default: ours and the scenario's own)",
     )  # fmt: skip
 
 
@@ -120,6 +131,16 @@ def write_alone(parser: argparse.ArgumentParser) -> None:
             return run(options)
 
     parser.set_defaults(command=alone)
+
+
+def _method(text: str) -> Any:
+    """A method, as ``--method`` names it."""
+    from hippodrome.eval.contest.entry import parse_method  # not before it is needed: --help answers at once
+
+    try:
+        return parse_method(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def positive(text: str) -> int:

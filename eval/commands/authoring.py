@@ -11,7 +11,7 @@ from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, add_command, add
 
 
 def add_scenario_command(commands: Any) -> None:
-    """Adds ``scenario`` with its four sub-commands to the parser's ``commands``."""
+    """Adds ``scenario`` with its five sub-commands to the parser's ``commands``."""
     actions = add_group(
         commands, "scenario", "write, check and preview scenarios",
         """Write, check and preview scenarios.
@@ -68,6 +68,13 @@ def add_scenario_command(commands: Any) -> None:
     )  # fmt: skip
 
     add_command(
+        actions, "list", _list_scenarios, "list the scenarios that come with hippodrome",
+        """Print a line for each scenario that comes with hippodrome: its name, and what it is. `hippodrome eval` and the other
+        commands take the name in place of a file, as in `hippodrome eval towns/rural`.""",
+        ["hippodrome scenario list"],
+    )  # fmt: skip
+
+    add_command(
         actions, "schema", _schema, "print the JSON schema of a scenario",
         """Print the JSON schema of a scenario, with the meaning of each key. Editors complete and check with it.""",
         ["hippodrome scenario schema > scenario.schema.json"],
@@ -111,6 +118,14 @@ def _preview(options: argparse.Namespace) -> int:
         out = options.out / scenario.name
         print("\n".join(preview_scenario(scenario, out).lines()))
         print(f"pictures: {out / 'overview.png'}, {out / 'stills.png'}")
+    return DONE
+
+
+def _list_scenarios(_: argparse.Namespace) -> int:
+    from hippodrome.eval.files.shipped import names
+
+    for name, comment in names():
+        print(f"{name:<22} {comment}".rstrip())
     return DONE
 
 

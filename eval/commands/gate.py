@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_workers
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_methods, add_workers
 
 SEEDS = (1, 2, 3)
 CANNOT_TELL = 3  # exit status of a gate that has too few pairs for a verdict
@@ -50,6 +50,7 @@ def add_gate_commands(commands: Any) -> None:
         help="run nothing: say how large a regression of this method the gate would catch, on the baseline's own figures "
              "(without METHOD: topometric; default: the gate is run)",
     )  # fmt: skip
+    add_methods(parser)
     add_workers(parser)
     parser.add_argument(
         "--out", type=Path, default=Path("out/gate"), metavar="DIR",
@@ -115,7 +116,8 @@ def _gate(options: argparse.Namespace) -> int:
         return DONE
     names = ("scenarios", "seeds", "baseline", "update", "workers", "out", "junit", "town_limit")
     with written_by_one(options.out):
-        return STATUS[gate(GateRequest(**{name: getattr(options, name) for name in names}))]
+        request = GateRequest(**{name: getattr(options, name) for name in names}, methods=options.method)
+        return STATUS[gate(request)]
 
 
 def _compare(options: argparse.Namespace) -> int:

@@ -6,7 +6,15 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_out, add_scenarios, add_workers
+from hippodrome.eval.commands.arguments import (
+    DONE,
+    THRESHOLD_FAILED,
+    add_command,
+    add_methods,
+    add_out,
+    add_scenarios,
+    add_workers,
+)
 
 
 def add_run_commands(commands: Any) -> None:
@@ -24,9 +32,11 @@ def add_run_commands(commands: Any) -> None:
 
         Exits with 1 if a threshold of a scenario does not hold.""",
         ["hippodrome eval scenarios/towns/rural.yaml --out out/rural",
-         "hippodrome eval my-town.yaml --network my_town.net.xml --seed 7 --workers 2"],
+         "hippodrome eval my-town.yaml --network my_town.net.xml --seed 7 --workers 2",
+         "hippodrome eval scenarios/towns/grid.yaml --method my_package.my_module:MyMapper"],
     )  # fmt: skip
     add_scenarios(evaluate, several=True)
+    add_methods(evaluate)
     add_workers(evaluate)
     add_out(evaluate, "out/eval")
 
@@ -59,7 +69,8 @@ def add_run_commands(commands: Any) -> None:
 def _evaluate(options: argparse.Namespace) -> int:
     from hippodrome.eval.run import evaluate
 
-    return DONE if evaluate(options.scenarios, options.network, options.seed, options.workers, options.out) else THRESHOLD_FAILED
+    holds = evaluate(options.scenarios, options.network, options.seed, options.workers, options.out, options.method)
+    return DONE if holds else THRESHOLD_FAILED
 
 
 def _render(options: argparse.Namespace) -> int:

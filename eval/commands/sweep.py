@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_out, add_workers, seed
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_methods, add_out, add_workers, seed
 
 
 def add_sweep_command(commands: Any) -> None:
@@ -36,6 +36,7 @@ def add_sweep_command(commands: Any) -> None:
         help="values, as YAML, that a scenario's key takes in turn; docs/scenarios.md lists the keys. Given several times, all "
              "combinations are run (default: the scenario as it is written)",
     )  # fmt: skip
+    add_methods(parser)
     add_workers(parser)
     parser.add_argument(
         "--scheduler", metavar="ADDRESS",
@@ -55,5 +56,7 @@ def _sweep(options: argparse.Namespace) -> int:
         parameters = [parse_parameter(text) for text in options.parameters]
     except ValueError as error:
         raise SweepError(f"--set: {error}") from None
-    complete = sweep(options.scenarios, options.seeds, parameters, options.workers, options.scheduler, options.out)
+    complete = sweep(
+        options.scenarios, options.seeds, parameters, options.workers, options.scheduler, options.out, options.method
+    )
     return DONE if complete else THRESHOLD_FAILED

@@ -11,7 +11,7 @@ from hippodrome.eval.figures.errors import draw_error_profiles, draw_error_violi
 from hippodrome.eval.figures.frames import draw_contact_sheet
 from hippodrome.eval.figures.localization import draw_localization_error, draw_localization_strip, strip_steps
 from hippodrome.eval.figures.maps import draw_cognitive_map, draw_error_map, draw_maps_over_truth
-from hippodrome.eval.methods.materials import Materials, ScoredTrajectory, TopometricResult
+from hippodrome.eval.methods.materials import Materials, Outcome, ScoredTrajectory
 from hippodrome.eval.methods.method import Method
 from hippodrome.eval.metrics.alignment import apply_to_positions, find_alignment
 from hippodrome.eval.metrics.association import associate
@@ -22,27 +22,28 @@ CONTACT_FRAMES = 24  # in four rows of six: enough frames to see the town, large
 
 def draw_scenario(
     materials: Materials,
-    semi_metric: CognitiveMap,
+    semi_metric: CognitiveMap | None,
     scored: Mapping[Method, ScoredTrajectory],
-    topometric: Mapping[Method, TopometricResult],
+    localized: Mapping[Method, Outcome],
 ) -> None:
     """Draw all pictures of an evaluation: frames, maps, errors along the drive, localization.
 
     Args:
         materials: What was evaluated.
-        semi_metric: The semi-metric map.
+        semi_metric: The semi-metric map, if there is one.
         scored: Trajectories and errors of the methods that are shown.
-        topometric: The refined maps, and the second drive's localization in each.
+        localized: The methods that localized the second drive.
     """
     folder, name = materials.folder, materials.scenario.name
     frames, captions = _contact_sheet(materials.mapping)
     draw_contact_sheet(folder / "frames.png", frames, captions, title=f"{name}: the mapping drive as the camera sees it")
-    draw_cognitive_map(folder / "semi-metric-map.png", semi_metric, f"{name}: semi-metric map, as built")
+    if semi_metric is not None:
+        draw_cognitive_map(folder / "semi-metric-map.png", semi_metric, f"{name}: semi-metric map, as built")
     draw_methods(materials, scored)
-    for method, result in topometric.items():
-        _draw_topometric(materials, method, result)
-    if topometric:
-        _draw_neurodynamics(materials, *list(topometric.items())[-1])
+    for method, outcome in localized.items():
+        _draw_localized(materials, method, outcome)
+    if with_networks := [outcome for outcome in localized.values() if _has_networks(outcome)]:
+        _draw_neurodynamics(materials, with_networks[-1])
 
 
 def draw_methods(materials: Materials, scored: Mapping[Method, ScoredTrajectory]) -> None:
@@ -62,25 +63,34 @@ def placed(one: ScoredTrajectory, truth: Trajectory) -> FloatArray:
     return apply_to_positions(transform, one.trajectory.poses[:, :2])
 
 
-def _draw_topometric(materials: Materials, method: Method, result: TopometricResult) -> None:
+def _draw_localized(materials: Materials, method: Method, outcome: Outcome) -> None:
     """APE on the map, and the second drive's error."""
     name, folder = materials.scenario.name, materials.folder
-    scored, localized = result.scored, result.localized
-    draw_error_map(folder / f"{method.stem}-ape.png", materials.roads, scored.trajectory.poses, scored.ape.errors_m,
+    scored, localized = outcome.scored, outcome.localized
+    assert localized is not None
+    placed_m = scored.trajectory.poses if method.frame == "network" else placed(scored, materials.mapping.ground_truth())
+    draw_error_map(folder / f"{method.stem}-ape.png", materials.roads, placed_m, scored.ape.errors_m,
                    f"{name}: {method.label}, APE on the map")  # fmt: skip
     draw_localization_error(folder / f"{method.stem}-localization.png", localized.t_s, localized.errors_m,
                             localized.localized, f"{name}: localization in the map '{method.label}'")  # fmt: skip
 
 
-def _draw_neurodynamics(materials: Materials, method: Method, result: TopometricResult) -> None:
+def _has_networks(outcome: Outcome) -> bool:
+    """Whether the localizer's answers show the states of grid cells, as ours do."""
+    return outcome.localization is not None and all(len(one.grid_phase_rad) for one in outcome.localization.estimates)
+
+
+def _draw_neurodynamics(materials: Materials, outcome: Outcome) -> None:
     """Frames, grid cells, head direction and error while the estimate settles (the paper's Fig. 4 A-D)."""
-    name, path, localized = materials.scenario.name, materials.folder / "neurodynamics.png", result.localized
+    assert outcome.localization is not None
+    assert outcome.localized is not None
+    name, path, localized = materials.scenario.name, materials.folder / "neurodynamics.png", outcome.localized
     samples = materials.drive.samples
     steps = samples.frame_steps[strip_steps(samples.t_s[samples.frame_steps])]
     frames = [materials.drive.frame(int(samples.frame[step])) for step in steps]
-    shown = [result.localization.estimates[step] for step in steps]
+    shown = [outcome.localization.estimates[step] for step in steps]
     draw_localization_strip(path, frames, shown, localized.t_s, localized.errors_m,
-                            title=f"{name}: localization in the map '{method.label}' from an unknown start")  # fmt: skip
+                            title=f"{name}: localization in the map '{outcome.method.label}' from an unknown start")  # fmt: skip
 
 
 def _contact_sheet(recording: Recording) -> tuple[list[Frame], list[str]]:

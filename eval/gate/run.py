@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import IO
 
 from hippodrome._files import write_atomically
+from hippodrome.eval.contest.entry import Added
 from hippodrome.eval.gate.baseline import Baseline, GateError, baseline_of, read_baseline, write_baseline
 from hippodrome.eval.gate.compare import Verdict, compare
 from hippodrome.eval.gate.report import junit_xml, outcome_of, print_verdict, summary_markdown
@@ -35,6 +36,7 @@ class GateRequest:
     out: Path
     junit: Path | None  # where the verdict goes as JUnit XML too
     town_limit: float | None = None  # share by which no figure may become worse in a single town
+    methods: Sequence[Added] = ()  # that take part beside ours and the scenarios' own
 
 
 def gate(request: GateRequest) -> str:
@@ -128,4 +130,5 @@ def broken_limits(runs: Sequence[Results]) -> list[str]:
 
 def _run(request: GateRequest, seed: int) -> Results:
     """One seed; recordings that are there already are not made again, everything after them is."""
-    return run_scenarios(load_scenarios(request.scenarios, None, seed), request.workers, request.out / f"seed-{seed}")
+    scenarios = load_scenarios(request.scenarios, None, seed, request.methods)
+    return run_scenarios(scenarios, request.workers, request.out / f"seed-{seed}")

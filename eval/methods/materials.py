@@ -11,9 +11,10 @@ import numpy as np
 
 from hippodrome.core.refinement.refine import RefineConfig
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import Refinement, StartPose, Trajectory
+from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, StartPose, Trajectory
 from hippodrome.eval.files.scenarios import effective_configuration
 from hippodrome.eval.methods.method import Method, RefineMode
+from hippodrome.eval.methods.protocol import Mapped
 from hippodrome.eval.methods.stages import Localization
 from hippodrome.eval.metrics.alignment import AlignmentName
 from hippodrome.eval.metrics.localization import LocalizationScore
@@ -39,6 +40,11 @@ class Materials:
     drive: Recording  # the second drive, which is localized in the map
 
     @property
+    def truth_folders(self) -> tuple[Path, ...]:
+        """Folders that the truth can be read from: the recordings, and this scenario's results."""
+        return self.mapping.folder.parent, self.folder
+
+    @property
     def duration_s(self) -> float:
         """Duration of the mapping drive."""
         return float(self.mapping.samples.t_s[-1])
@@ -55,9 +61,21 @@ def gather(scenario: Scenario, out: Path) -> Materials:
     town = mapping.town()
     rng = np.random.default_rng([scenario.seed, 2])
     roads = with_survey_error(town.network, scenario.self_motion_noise.survey_error_m, rng)
+    recordings = finish(mapping), finish(drive)
+    for recording in recordings:
+        _require_truth(recording)
     folder = out / scenario.name
     folder.mkdir(parents=True, exist_ok=True)
-    return Materials(scenario, folder, town, roads, finish(mapping), finish(drive))
+    return Materials(scenario, folder, town, roads, *recordings)
+
+
+def _require_truth(recording: Recording) -> None:
+    """Raise HippodromeError unless the truth of a recording is known at all its steps, in the road network's frame."""
+    cure = "import it with --truth and --truth-frame network, or use `hippodrome run`, which needs no truth"
+    if not np.isfinite(recording.samples.poses_m).all():
+        raise HippodromeError(f"{recording.folder}: its truth is not known everywhere, so no method can be scored on it; {cure}")
+    if recording.manifest.get("truth_frame", "network") != "network":
+        raise HippodromeError(f"{recording.folder}: its truth lies in a frame of its own, not in the road network's; {cure}")
 
 
 def true_start(drive: Recording) -> StartPose:
@@ -106,12 +124,24 @@ def score_trajectory(trajectory: Trajectory, truth: Trajectory, alignment: Align
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TopometricResult:
-    """What one mode of the refinement gave, and how the second drive was localized in its map."""
+class Outcome:
+    """What one method came to on one scenario: its map of the first drive, and how the second was localized in it."""
 
-    refinement: Refinement
+    method: Method
+    mapped: Mapped
     scored: ScoredTrajectory
-    map_bytes: int
-    cpu_s: float  # of the refinement
-    localization: Localization
-    localized: LocalizationScore
+    cpu_s: float  # of its map, together with the map that it builds on
+    own_cpu_s: float  # of its map alone
+    step_s: FloatArray  # (N,) from handing it an observation of the mapping drive until it was done with it; empty if it saw none
+    map_bytes: int | None = None
+    covered: float = 1.0  # share of the times at which it was to be scored for which it has a pose
+    peak_rss_bytes: int | None = None  # of a process of its own, if it has one
+    localization: Localization | None = None
+    localized: LocalizationScore | None = None
+    failure: str | None = None  # why it has no localization, if it should have one
+
+    @property
+    def refined(self) -> CognitiveMap | None:
+        """Its topometric map, if it made one of our kind."""
+        found = self.mapped.cognitive_map
+        return found if found is not None and found.frame == "network" else None

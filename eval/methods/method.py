@@ -35,6 +35,7 @@ class Method:
     system: str | None = None  # label of the system of which it is a variant, if it is one of several
     map_file: str | None = None  # name of its map in a scenario's folder, if it keeps one there
     mode: RefineMode | None = None  # mode of the refinement, if its map is a refined one
+    drawn: bool = True  # whether its trajectory is drawn; not if it would cover another's, whose poses are the same
 
     @property
     def alignment(self) -> AlignmentName:
@@ -56,6 +57,7 @@ NO_ATTRACTOR: Final = Method(
     "own",
     "semi-metric-no-attractor",
     map_file="semi-metric-no-attractor.pbstream",
+    drawn=False,
 )
 TOPOMETRIC_PAPER: Final = Method(
     "topometric_paper",
@@ -92,8 +94,10 @@ REFINED: Final = (TOPOMETRIC_PAPER, TOPOMETRIC)  # their maps are refined, and a
 ALWAYS: Final = (*REFINED, SEMI_METRIC, DEAD_RECKONING)  # every evaluation has these rows, so thresholds can speak of them
 
 
-def method_of(label: str) -> Method:
+def method_of(label: str, frame: str | None = None) -> Method:
     """The method of a row, by the label that results files know it by.
+
+    ``frame`` is the one that the row declares; it counts for a method that the table lacks.
 
     A label that the table lacks, from a results file of another version or another program, gets a method as well: a variant of
     the known method that its label begins with (``topometric (tuned)``), and otherwise one with a frame of its own.
@@ -101,8 +105,16 @@ def method_of(label: str) -> Method:
     known = {method.label: method for method in METHODS}
     if label in known:
         return known[label]
-    stem = label.replace(" (", "-").replace(")", "").replace(",", "").replace(" ", "-")
+    stem = stem_of(label)
+    declared = next((known for known in ALIGNMENTS if known == frame), None)
+    if declared is not None:
+        return Method(stem, label, declared, stem)
     whole = max((name for name in known if label.startswith(name)), key=len, default=None)
     if whole is None:
         return Method(stem, label, "own", stem)
     return Method(stem, label, known[whole].frame, stem, system=known[whole].system or whole)
+
+
+def stem_of(label: str) -> str:
+    """What the files of a method with this label are named after."""
+    return label.replace(" (", "-").replace(")", "").replace(",", "").replace(" ", "-")

@@ -30,6 +30,7 @@ from hippodrome.eval.results.tables import (
 
 SHOWN: Final = (SEMI_METRIC.label, TOPOMETRIC.label)
 COLOUR_RANGE_M: Final = (0.05, 5.0)  # of the errors, from a tyre's width to a car's length
+README_COLUMNS: Final = ("Method", "CPU (%)", "APE (m)", "APE SE(2) (m)", "APE Sim(2) (m)", "RPE (m)")
 FRAMES: Final = 4  # shown of the drive, in two rows
 PICTURE, README = Path("docs/result.png"), Path("README.md")
 BEGIN, END = "<!-- table: made by hippodrome.eval.report.cover -->\n", "<!-- end of table -->"
@@ -112,7 +113,7 @@ def _frameless(axes: Axes, title: str) -> None:
 def with_table(text: str, result: ScenarioResult, quoted: Sequence[Row]) -> str:
     """A document with the part between the two marks made anew: a few columns of Table I, and the localization error."""
     columns = [
-        *(column for column in MAPPING_COLUMNS if column.title in ("Method", "CPU (%)", "APE (m)", "RPE (m)")),
+        *(column for column in MAPPING_COLUMNS if column.title in README_COLUMNS),
         Column("Localization (m)", next(column.cell for column in LOCALIZATION_COLUMNS if column.title == "Error (m)")),
     ]
     rows = (row_cells(columns, row) for row in (*result.rows, *quoted))

@@ -16,7 +16,7 @@ from shapely import LineString
 from hippodrome._files import write_atomically
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, Trajectory
-from hippodrome.eval.methods.materials import Materials, ScoredTrajectory, TopometricResult
+from hippodrome.eval.methods.materials import Materials, Outcome, ScoredTrajectory
 from hippodrome.eval.methods.method import Method
 from hippodrome.eval.metrics.alignment import apply_to_positions, find_alignment
 from hippodrome.eval.metrics.association import associate
@@ -53,6 +53,7 @@ class Layer(TimedPath):
     """A method's vertices, placed as they were for scoring; an error is None where there is no truth at a vertex's time."""
 
     name: str  # label of the method
+    frame: str | None = None  # that the method declares; None in files of older versions
     error_m: list[float | None]
     worst: list[Annotated[int, Field(ge=0)]]  # vertices with the largest errors, largest first
 
@@ -88,7 +89,7 @@ class MapEvidence(_Model):
 
 
 def write_map_evidence(
-    materials: Materials, scored: Mapping[Method, ScoredTrajectory], topometric: Mapping[Method, TopometricResult]
+    materials: Materials, scored: Mapping[Method, ScoredTrajectory], localized: Mapping[Method, Outcome]
 ) -> None:
     """Write roads, the true path, every method's vertices with their errors, the localized drives, and frames along the way."""
     recording, truth = materials.mapping, materials.mapping.ground_truth()
@@ -100,7 +101,7 @@ def write_map_evidence(
         roads=_roads(materials.roads, truth.poses),
         truth=_path(truth),
         methods=layers,
-        drives=[_drive(method, result) for method, result in topometric.items()],
+        drives=[_drive(method, outcome) for method, outcome in localized.items()],
         thumbnails=Thumbnails(
             t_s=_rounded(_frame_times_s(recording)[frames]),
             columns=columns,
@@ -172,16 +173,19 @@ def _layer(method: Method, one: ScoredTrajectory, truth: Trajectory) -> Layer:
     errors_m[np.searchsorted(one.trajectory.t_s, one.ape.t_s)] = one.ape.errors_m
     return Layer(
         name=method.label,
+        frame=method.frame,
         **_columns(one.trajectory.t_s, placed_m),
         error_m=[None if np.isnan(error) else round(float(error), DECIMALS_M) for error in errors_m],
         worst=worst_places(errors_m),
     )
 
 
-def _drive(method: Method, result: TopometricResult) -> LocalizedDrive:
-    score = result.localized
+def _drive(method: Method, outcome: Outcome) -> LocalizedDrive:
+    assert outcome.localized is not None
+    assert outcome.localization is not None
+    score = outcome.localized
     seconds = np.unique(np.searchsorted(score.t_s, np.arange(score.t_s[0], score.t_s[-1], 1.0)))
-    at = {estimate.t_s: estimate.pose for estimate in result.localization.estimates}
+    at = {estimate.t_s: estimate.pose for estimate in outcome.localization.estimates}
     poses = np.array([at[float(t_s)] for t_s in score.t_s[seconds]])
     return LocalizedDrive(
         name=method.label,

@@ -22,6 +22,7 @@ from hippodrome.eval.report.tables import (
     scrolling,
     worst_places,
 )
+from hippodrome.eval.results.aligned import aligned_note
 from hippodrome.eval.results.model import Row, ScenarioResult
 from hippodrome.eval.results.tables import definitions, failed_runs, scenario_title
 from hippodrome.eval.results.thresholds import failed_limits
@@ -48,6 +49,7 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         _headline(scenario),
         element("h3", "Mapping (Table I)"),
         mapping_table(scenario, quoted),
+        element("p", note, class_="note") if (note := aligned_note(rows)) is not None else None,
         _titled("Localization from an unknown start (Table II)", localization_table(scenario, quoted)),
         _titled("Ten sequences from unknown starts (Table II)", comparison.sequences(files.sequences)),
         _titled("Cheaper than ORB-SLAM3", comparison.ratios(files.ratios)),
@@ -85,6 +87,7 @@ def _verdict(scenario: ScenarioResult) -> Html | None:
 def _failures(scenario: ScenarioResult) -> Html | None:
     lines = [f"Limit: {line}" for line in _failed_limits(scenario) or []]
     lines += [f"{row.method} failed: {row.failure}" for row in scenario.rows if row.failure is not None]
+    lines += [f"{row.method}: map refused: {row.refused}" for row in scenario.rows if row.refused is not None]
     lines += failed_runs(scenario.rows)
     return element("ul", [element("li", line) for line in lines], class_="failures") if lines else None
 
@@ -109,8 +112,16 @@ def _headline(scenario: ScenarioResult) -> Html:
 
 
 def _tile(row: Row) -> Html:
+    if row.ape is None and row.places is not None:
+        right = element("strong", f"{100.0 * row.places.best_is_right:.0f} %")
+        return element("div", element("span", row.method), right, element("small", "of the places right"), class_="figure-tile")
     if row.ape is None:
         return element("div", element("span", row.method), element("strong", "failed", class_="bad"), class_="figure-tile")
+    if row.refused is not None:
+        small = element("small", f"nothing vouches for its {row.ape.mean_m:.0f}\N{NO-BREAK SPACE}m")
+        return element(
+            "div", element("span", row.method), element("strong", "refused", class_="bad"), small, class_="figure-tile"
+        )
     details = [f"mean APE, worst {row.ape.max_m:.1f}\N{NO-BREAK SPACE}m" if row.ape.max_m is not None else "mean APE"]
     if row.localization is not None and row.localization.error_mean_m is not None:
         details.append(f"localized to {row.localization.error_mean_m:.2f}\N{NO-BREAK SPACE}m")

@@ -92,7 +92,7 @@ def localization_table(scenario: ScenarioResult, quoted: Sequence[Row]) -> Html 
 
 def worst_places(evidence: MapEvidence, with_frames: bool) -> Html:
     """Where each method in the network's frame is worst, and what the camera saw there; buttons show the places on the map."""
-    layers = [layer for layer in evidence.methods if method_of(layer.name).frame == "network"]
+    layers = [layer for layer in evidence.methods if method_of(layer.name, layer.frame).frame == "network"]
     return joined([_worst_of(layer, evidence, with_frames) for layer in layers])
 
 
@@ -136,7 +136,7 @@ def _row_table(columns: Sequence[Column], rows: Sequence[Row], label: str) -> Ht
 
 
 def _row_line(cells: Sequence[str], row: Row) -> Html:
-    style = "failed" if row.failure is not None else "quoted" if row.quoted else None
+    style = "failed" if row.failure is not None or row.refused is not None else "quoted" if row.quoted else None
     return element("tr", element("th", cells[0], scope="row"), [element("td", cell) for cell in cells[1:]], class_=style)
 
 
@@ -160,7 +160,9 @@ def _words(status: object) -> str:
 def _ape(row: Row | None) -> Child:
     if row is None:
         return NONE
-    return element("span", "FAILED", class_="bad") if row.ape is None else f"{row.ape.mean_m:.2f}"
+    if row.ape is None:
+        return NONE if row.places is not None else element("span", "FAILED", class_="bad")
+    return element("span", f"REFUSED ({row.ape.mean_m:.2f})", class_="bad") if row.refused else f"{row.ape.mean_m:.2f}"
 
 
 def _location_error(row: Row | None) -> Child:

@@ -15,7 +15,9 @@ from hippodrome.eval.methods.method import (
     TOPOMETRIC_PAPER,
     method_of,
 )
+from hippodrome.eval.results.model import Row
 
+OURS: Final = "hippodrome"  # source of the methods that come with us
 HEAD: Final = ("Method", "Is given", "Frame of its APE", "What favours or burdens it")
 
 # By the label of the method, or of the system that it is a variant of: both trajectories of ORB-SLAM3 have one entry.
@@ -48,7 +50,22 @@ GIVEN: Final[dict[str, tuple[str, str, str]]] = {
 }
 
 
-def fairness_rows(labels: Iterable[str]) -> list[list[str]]:
-    """One row per method or system among these labels of a results file, in the columns of ``HEAD``."""
-    names = dict.fromkeys(method.system or method.label for method in map(method_of, labels))
-    return [[name, *GIVEN[name]] for name in names if name in GIVEN]
+FRAMES: Final = {"own": "start pose, no scale", "network": "network, no alignment", "metric": "best rigid fit, SE(2)"}
+TRUSTED: Final = "a class in our own process, trusted not to look for the truth"
+APART: Final = "a process of its own, trusted not to look for the truth: this system cannot hide it"
+ISOLATED: Final = "a process of its own, with nothing of the truth within its reach"
+
+
+def fairness_rows(rows: Iterable[Row]) -> list[list[str]]:
+    """One line per method or system among the rows of a results file, in the columns of ``HEAD``; others say it themselves."""
+    lines: dict[str, list[str]] = {}
+    for row in rows:
+        method = method_of(row.method)
+        name = method.system or method.label
+        if name in GIVEN and (row.declaration is None or row.declaration.source == OURS):
+            lines.setdefault(name, [name, *GIVEN[name]])
+        elif (said := row.declaration) is not None:
+            where = ISOLATED if said.isolated else APART if said.source.startswith(("exec:", "stream:")) else TRUSTED
+            frame = "-" if row.ape is None and row.places is not None else FRAMES.get(said.frame, said.frame)
+            lines[row.method] = [row.method, said.given, frame, where]
+    return list(lines.values())

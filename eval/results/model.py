@@ -15,7 +15,7 @@ from hippodrome.eval.metrics.trajectory import Score
 
 DECIMALS: Final = 6  # of every number: finer than any figure means, coarser than the rounding in which machines differ
 MAX_BYTES: Final = 64 << 20  # of a file that is read: far more than any run writes
-TIMING_FIELDS: Final = frozenset({"cpu_percent", "peak_rss_bytes", "initial_time_ms", "timings"})
+TIMING_FIELDS: Final = frozenset({"cpu_percent", "peak_rss_bytes", "initial_time_ms", "latency_ms", "timings"})
 
 
 class ResultsError(HippodromeError):
@@ -74,15 +74,46 @@ class LocalizationSummary(_Model):
     total: int | None = None
 
 
+class PlaceSummary(_Model):
+    """The figures of a ``PlaceScore``: place recognition alone."""
+
+    definition: str
+    places: int
+    queries: int
+    mapped: int
+    best_is_right: float
+    recall: float
+
+
+class Latency(_Model):
+    """Time from handing a method a frame or a reading until it is done with it [ms]."""
+
+    median: float
+    p99: float
+
+
+class Declaration(_Model):
+    """What a method says of itself, or is said of it."""
+
+    frame: str  # of its trajectory: own, network or metric
+    given: str  # what it is given, in words
+    source: str  # where it comes from: hippodrome, a class, or a command
+    isolated: bool  # whether it ran in a process of its own, with nothing of the truth within its reach
+
+
 class Row(_Model):
     """One method on one drive. A method that failed has a row too, and says why."""
 
     method: str  # label of the method, see ``eval.methods.method``
     quoted: bool = False  # copied from a paper, not measured here
     failure: str | None = None  # why it failed, if it did
+    refused: str | None = None  # why nothing vouches for its map, if nothing does: its errors are those of a guess
+    declaration: Declaration | None = None
     cpu_percent: float | None = None  # CPU time of the process, in per cent of the drive's duration
+    latency_ms: Latency | None = None  # per observation of the mapping drive
     map_bytes: int | None = None  # size of the saved map
     peak_rss_bytes: int | None = None  # most memory of a process that does nothing but run the method
+    covered: float | None = None  # share of the mapping drive for which the method has a pose
     camera_frames: int | None = None
     keyframes: int | None = None
     vertices: int | None = None
@@ -93,6 +124,7 @@ class Row(_Model):
     rpe: ErrorSummary | None = None  # between consecutive vertices
     rpe_20m: ErrorSummary | None = None
     localization: LocalizationSummary | None = None
+    places: PlaceSummary | None = None
 
 
 class ScenarioResult(_Model):

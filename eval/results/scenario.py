@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from hippodrome.eval.files.scenarios import effective_configuration, portable
-from hippodrome.eval.methods.materials import Materials, TopometricResult
-from hippodrome.eval.methods.method import Method
+from hippodrome.eval.methods.materials import Materials, Outcome
+from hippodrome.eval.methods.method import SEMI_METRIC
 from hippodrome.eval.results.model import Network, Row, ScenarioResult
 
 
-def scenario_result(
-    materials: Materials, rows: Sequence[Row], mapping_s: float, topometric: Mapping[Method, TopometricResult]
-) -> ScenarioResult:
+def scenario_result(materials: Materials, rows: Sequence[Row], outcomes: Sequence[Outcome]) -> ScenarioResult:
     """One entry of ``results.json``.
 
     Args:
         materials: What was evaluated.
         rows: The rows, in the order of the tables.
-        mapping_s: CPU seconds that the semi-metric map took.
-        topometric: The refined maps, for the times of their stages.
+        outcomes: What the methods came to, for the times of their stages.
     """
     scenario = materials.scenario
     recordings = {"mapping": materials.mapping, "localization": materials.drive}
-    step_ms = {method: 1e3 * float(result.localization.step_s.mean()) for method, result in topometric.items()}
     return ScenarioResult(
         name=scenario.name,
         seed=scenario.seed,
@@ -34,15 +30,23 @@ def scenario_result(
         frames=materials.mapping.frame_count,
         duration_s=materials.duration_s,
         rows=tuple(rows),
-        tours={role: recording.manifest["tour"] for role, recording in recordings.items()},
+        tours={role: recording.manifest.get("tour") for role, recording in recordings.items()},
         town_notes=list(materials.town.notes),
         configuration=effective_configuration(scenario),
-        timings={
-            "mapping_cpu_s": mapping_s,
-            **{f"{method.label}: refinement_cpu_s": result.cpu_s for method, result in topometric.items()},
-            **{f"{method.label}: localization_step_ms": value for method, value in step_ms.items()},
-        },
+        timings=_timings(outcomes),
     )
+
+
+def _timings(outcomes: Sequence[Outcome]) -> dict[str, float]:
+    """CPU time of the stages: ``mapping_cpu_s`` is that of the semi-metric map, on which the refined ones build."""
+    semi_metric = [outcome.own_cpu_s for outcome in outcomes if outcome.method == SEMI_METRIC]
+    found = {"mapping_cpu_s": semi_metric[0]} if semi_metric else {}
+    refined = [outcome for outcome in outcomes if outcome.refined is not None]
+    found |= {f"{outcome.method.label}: refinement_cpu_s": outcome.own_cpu_s for outcome in refined}
+    for outcome in outcomes:
+        if outcome.localization is not None:
+            found[f"{outcome.method.label}: localization_step_ms"] = 1e3 * float(outcome.localization.step_s.mean())
+    return found
 
 
 def _network(materials: Materials) -> Network:

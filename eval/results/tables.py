@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hippodrome.eval.results import markdown
+from hippodrome.eval.results.aligned import aligned_note
 from hippodrome.eval.results.model import ErrorSummary, Results, Row, ScenarioResult
 
 QUOTED_MARK: Final = "†"
@@ -47,6 +48,23 @@ def _count(value: int | None) -> str:
 
 def _mean(error: ErrorSummary | None) -> str:
     return NONE if error is None else _figure(error.mean_m)
+
+
+def _placed(row: Row, figure: Callable[[float], str]) -> str:
+    """Mean APE as the map lies; in brackets where it lies by a guess."""
+    if row.ape is None:
+        return NONE
+    return f"({figure(row.ape.mean_m)})" if row.refused else figure(row.ape.mean_m)
+
+
+def _latency(row: Row) -> str:
+    """Median and 99th percentile."""
+    return NONE if row.latency_ms is None else f"{_figure(row.latency_ms.median)} / {_figure(row.latency_ms.p99)}"
+
+
+def _covered(row: Row) -> str:
+    """Share of the drive that a method answered for, where that is not all of it."""
+    return NONE if row.covered is None or row.covered == 1.0 else f"{100.0 * row.covered:.0f}"
 
 
 def _spread(error: ErrorSummary | None) -> str:
@@ -105,12 +123,17 @@ MAPPING_COLUMNS = (
     Column("Keyframes", lambda row: _count(row.keyframes)),
     Column("Vertices", lambda row: _count(row.vertices)),
     Column("Edges", lambda row: _count(row.edges)),
-    Column("APE (m)", lambda row: _mean(row.ape)),
+    Column("APE (m)", lambda row: _placed(row, _figure)),
+    Column("APE SE(2) (m)", lambda row: _mean(row.ape_se2)),
+    Column("APE Sim(2) (m)", lambda row: _mean(row.ape_sim2)),
     Column("APE median / p95 / max", lambda row: _spread(row.ape)),
     Column("APE of the runs", _runs),
     Column("RPE (m)", lambda row: _mean(row.rpe)),
     Column("RPE 20 m (m)", lambda row: _mean(row.rpe_20m)),
-    Column("APE Sim(2) (m)", lambda row: _mean(row.ape_sim2)),
+    Column("Latency (ms)", _latency),
+    Column("Places right (%)", lambda row: NONE if row.places is None else _percent(row.places.best_is_right)),
+    Column("Places recalled (%)", lambda row: NONE if row.places is None else _percent(row.places.recall)),
+    Column("Covered (%)", _covered),
 )
 
 LOCALIZATION_COLUMNS = (
@@ -149,17 +172,18 @@ def _short(value: float | None) -> str:
 TERMINAL_COLUMNS = (  # they fit 80 characters; table1.md has the rest
     Column("CPU %", lambda row: _short(row.cpu_percent)),
     Column("MB", lambda row: NONE if row.map_bytes is None else _short(row.map_bytes / MEGABYTE)),
-    Column("APE m", lambda row: NONE if row.ape is None else _short(row.ape.mean_m)),
+    Column("APE m", lambda row: _placed(row, _short)),
     Column("worst", lambda row: NONE if row.ape is None else _short(row.ape.max_m)),
     Column("RPE m", lambda row: NONE if row.rpe is None else _short(row.rpe.mean_m)),
-    Column("20 m", lambda row: NONE if row.rpe_20m is None else _short(row.rpe_20m.mean_m)),
+    Column("Sim2", lambda row: NONE if row.ape_sim2 is None else _short(row.ape_sim2.mean_m)),
     Column("loc m", lambda row: _localization(row, _short, "error_mean_m")),
     Column("fix m", lambda row: _localization(row, _short, "initial_distance_m")),
     Column("false", lambda row: _localization(row, _count, "false_fixes")),
 )
 TERMINAL_NOTE = (
-    "Means over the vertices: APE, its worst, RPE between consecutive vertices and over 20 m. Second drive: loc, its error "
-    "once localized; fix, metres driven until then; false, confident fixes over 20 m off."
+    "Means over the vertices: APE as the map lies, its worst; RPE between consecutive vertices; Sim2, APE after the best "
+    "similarity fit. Second drive: loc, its error once localized; fix, metres driven until then; false, confident fixes over "
+    "20 m off."
 )
 
 
@@ -168,8 +192,10 @@ def print_table_one(results: Results, quoted: Sequence[Row], console: Console) -
     for scenario in results.scenarios:
         console.print(_terminal_table(scenario_title(scenario), scenario.rows))
         for row in scenario.rows:
-            if row.failure is not None:
-                console.print(f"{row.method}: FAILED: {row.failure}", markup=False, style="red", highlight=False)
+            for line in _complaints(row):
+                console.print(line, markup=False, style="red", highlight=False)
+        if (note := aligned_note(scenario.rows)) is not None:
+            console.print(note, markup=False, highlight=False)
     if quoted:
         console.print(_terminal_table(f"the paper {QUOTED_MARK}", quoted))
     console.print(TERMINAL_NOTE, markup=False, style="dim", highlight=False)
@@ -183,7 +209,8 @@ def _terminal_table(title: str, rows: Sequence[Row]) -> Table:
     for column in TERMINAL_COLUMNS:
         table.add_column(column.title, justify="right", no_wrap=True, min_width=4)
     for row in rows:
-        table.add_row(Text(row.method), *(column.cell(row) for column in TERMINAL_COLUMNS))
+        name = Text(f"{row.method} REFUSED", style="red") if row.refused else Text(row.method)
+        table.add_row(name, *(column.cell(row) for column in TERMINAL_COLUMNS))
     return table
 
 
@@ -201,9 +228,17 @@ def definitions(rows: Sequence[Row]) -> list[str]:
     """What the figures in these rows mean: one line per definition, with the methods that it holds for."""
     methods_of: dict[tuple[str, str], list[str]] = {}
     for row in rows:
-        for title, field in (("APE", row.ape), ("RPE", row.rpe), ("RPE 20 m", row.rpe_20m), ("APE Sim(2)", row.ape_sim2)):
+        for title, field in (
+            ("APE", row.ape),
+            ("RPE", row.rpe),
+            ("RPE 20 m", row.rpe_20m),
+            ("APE SE(2)", row.ape_se2),
+            ("APE Sim(2)", row.ape_sim2),
+        ):
             if field is not None:
                 methods_of.setdefault((title, field.definition), []).append(_method(row))
+        if row.places is not None:
+            methods_of.setdefault(("Places", row.places.definition), []).append(_method(row))
         if row.localization is not None:
             methods_of.setdefault(("Localization", row.localization.definition), []).append(_method(row))
     return [f"{title} ({', '.join(methods)}): {definition}" for (title, definition), methods in sorted(methods_of.items())]
@@ -212,7 +247,14 @@ def definitions(rows: Sequence[Row]) -> list[str]:
 def row_cells(columns: Sequence[Column], row: Row) -> list[str]:
     """What the columns say of a row; its first cell, the method's name, also says if the method failed."""
     cells = [column.cell(row) for column in columns]
-    return cells if row.failure is None else [f"{cells[0]} (FAILED)", *cells[1:]]
+    mark = " (FAILED)" if row.failure is not None else " (REFUSED)" if row.refused is not None else ""
+    return [f"{cells[0]}{mark}", *cells[1:]]
+
+
+def _complaints(row: Row) -> list[str]:
+    """What is wrong with a row, a line each."""
+    failed = [f"{row.method}: FAILED: {row.failure}"] if row.failure is not None else []
+    return failed + ([f"{row.method}: REFUSED: {row.refused}"] if row.refused is not None else [])
 
 
 def filled_columns(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
@@ -225,7 +267,8 @@ def _scenario_markdown(scenario: ScenarioResult, quoted: Sequence[Row]) -> str:
     parts = [f"## {markdown.escaped(scenario_title(scenario))}", "", *_table(MAPPING_COLUMNS, rows), ""]
     if localizing := [row for row in rows if row.localization is not None]:
         parts += ["### Localization from an unknown start", "", *_table(LOCALIZATION_COLUMNS, localizing), ""]
-    lines = [f"{row.method}: FAILED: {row.failure}" for row in rows if row.failure is not None]
+    lines = [line for row in rows for line in _complaints(row)]
+    lines += [note] if (note := aligned_note(rows)) is not None else []
     notes = [f"- {markdown.escaped(line)}" for line in (*lines, *failed_runs(rows), *definitions(rows))]
     mark = [f"- {QUOTED_NOTE}"] if any(row.quoted for row in rows) else []
     return "\n".join([*parts, *notes, *mark, ""])

@@ -8,89 +8,94 @@ the networks are for is localization, which the localization table measures.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import ClassVar, Final
 
 import numpy as np
 
 from hippodrome._files import write_atomically
 from hippodrome.core.mapping.mapper import MapperConfig
 from hippodrome.core.se2 import interpolate
-from hippodrome.core.types import AttractorStates, CognitiveMap, FloatArray, HippodromeError, Observation, Trajectory
-from hippodrome.eval.files.trajectories import write_tum
-from hippodrome.eval.methods.materials import Materials, ScoredTrajectory, score_trajectory
-from hippodrome.eval.methods.method import NO_ATTRACTOR, RATSLAM, Method
+from hippodrome.core.types import AttractorStates, CognitiveMap, HippodromeError, Observation, Trajectory
+from hippodrome.eval.methods.method import NO_ATTRACTOR, RATSLAM
+from hippodrome.eval.methods.ours import mapped_of
+from hippodrome.eval.methods.protocol import Given, Mapped, Needs
 from hippodrome.eval.methods.stages import map_recording
-from hippodrome.eval.results.model import Row
-from hippodrome.eval.results.rows import map_size, own_frame_row
 from hippodrome.eval.rivals.ablation import MapperWithoutAttractor
 from hippodrome.eval.rivals.ratslam.system import RatSlam, RatSlamConfig, RatSlamMap
 from hippodrome.proto.codec import save_map
+from hippodrome.sim.scenario import Scenario
 
 RATSLAM_LONGEST_S: Final = 3_600.0  # the paper's drive of 1,315 s takes RatSLAM a minute of CPU, so this takes some seven
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RivalResult:
-    """A rival's row, and its trajectory with its errors; None if it failed, as the row says."""
+class RatSlamMethod:
+    """RatSLAM as the protocol has it."""
 
-    method: Method
-    row: Row
-    scored: ScoredTrajectory | None
+    card: ClassVar = RATSLAM
+    needs: ClassVar = Needs()
 
+    def map(self, observations: Iterator[Observation], given: Given) -> Mapped:
+        """RatSLAM's experience map. Raises HippodromeError for a drive that would take it too long."""
+        if given.duration_s > RATSLAM_LONGEST_S:
+            raise HippodromeError(
+                f"not run: the drive takes {given.duration_s:.0f} s, more than {RATSLAM_LONGEST_S:.0f} s; relaxing the map at "
+                "every experience takes the square of that"
+            )
+        system, times_s = RatSlam(RatSlamConfig()), []
+        for observation in observations:
+            system.step(observation)
+            times_s.append(observation.t_s)
+        found = system.finish()
+        counts = {
+            "vertices": len(found.poses),
+            "edges": len(found.links.source),
+            "view_cells": len(found.images),
+        }
+        trajectory = _held(found.trajectory, times_s[0], times_s[-1])
+        return Mapped(trajectory, state=found, figures=counts, save=lambda path: save_ratslam(path, found))
 
-def run_rivals(materials: Materials, at_s: FloatArray) -> list[RivalResult]:
-    """Run every rival on the mapping drive. Maps and trajectories go to the scenario's folder; a rival that fails has a row too.
-
-    Args:
-        materials: The drive, and the scenario.
-        at_s: Times (N,) at which all trajectories are sampled, those of the semi-metric map's vertices.
-    """
-    results = []
-    for method, run in ((RATSLAM, _ratslam), (NO_ATTRACTOR, _no_attractor)):
-        try:
-            results.append(run(materials, at_s))
-        except HippodromeError as error:
-            results.append(RivalResult(method, Row(method=method.label, failure=str(error)), None))
-    return results
-
-
-def _ratslam(materials: Materials, at_s: FloatArray) -> RivalResult:
-    if materials.duration_s > RATSLAM_LONGEST_S:
-        raise HippodromeError(
-            f"not run: the drive takes {materials.duration_s:.0f} s, more than {RATSLAM_LONGEST_S:.0f} s; relaxing the map at "
-            "every experience takes the square of that"
-        )
-    ratslam_map, cpu_s = run_ratslam(materials.mapping.observations())
-    map_bytes = save_ratslam(RATSLAM.map_path(materials.folder), ratslam_map)
-    counts = {
-        "vertices": len(ratslam_map.poses),
-        "edges": len(ratslam_map.links.source),
-        "view_cells": len(ratslam_map.images),
-    }
-    return _result(RATSLAM, ratslam_map.trajectory, at_s, materials, cpu_s, map_bytes=map_bytes, **counts)
+    @staticmethod
+    def warm_up() -> None:
+        """Compile the inner loops."""
+        _warm_up()
 
 
-def _no_attractor(materials: Materials, at_s: FloatArray) -> RivalResult:
-    cognitive_map, cpu_s = map_without_attractor(materials.mapping.observations(), materials.scenario.mapper)
-    map_bytes = save_map(NO_ATTRACTOR.map_path(materials.folder), cognitive_map, {"method": NO_ATTRACTOR.label})
-    trajectory = Trajectory(cognitive_map.t_s, cognitive_map.poses)
-    return _result(NO_ATTRACTOR, trajectory, at_s, materials, cpu_s, map_bytes=map_bytes, **map_size(cognitive_map))
+class NoAttractor:
+    """The ablation as the protocol has it."""
+
+    card: ClassVar = NO_ATTRACTOR
+    needs: ClassVar = Needs()
+
+    def __init__(self, config: MapperConfig) -> None:
+        self._config = config
+
+    @classmethod
+    def of_scenario(cls, scenario: Scenario) -> NoAttractor:
+        """With the scenario's configuration of the mapper."""
+        return cls(scenario.mapper)
+
+    def map(self, observations: Iterator[Observation], given: Given) -> Mapped:
+        """The semi-metric map without the networks' states."""
+        found = mapped_of(map_without_attractor(observations, self._config)[0])
+        cognitive_map = found.cognitive_map
+        assert cognitive_map is not None
+        at_s, poses = found.trajectory.t_s, found.trajectory.poses
+        wrapped = Trajectory(at_s, interpolate(at_s, poses, at_s))  # rounds its headings, as ever
+        return replace(found, trajectory=wrapped, save=lambda path: save_map(path, cognitive_map, {"method": NO_ATTRACTOR.label}))
 
 
-def _result(
-    method: Method, trajectory: Trajectory, at_s: FloatArray, materials: Materials, cpu_s: float, **fields: Any
-) -> RivalResult:
-    """Sample, write and score a rival's trajectory; ``fields`` are further fields of its row."""
-    truth = materials.mapping.ground_truth()
-    sampled = Trajectory(at_s, interpolate(trajectory.t_s, trajectory.poses, at_s))
-    write_tum(materials.folder / f"{method.stem}.tum", sampled)
-    scored = score_trajectory(sampled, truth, method.alignment)
-    row = own_frame_row(method, scored, truth, cpu_percent=100 * cpu_s / materials.duration_s, **fields)
-    return RivalResult(method, row, scored)
+def _held(trajectory: Trajectory, first_s: float, last_s: float) -> Trajectory:
+    """A trajectory of events, held from the first observation on and up to the last: between events the vehicle stays."""
+    t_s, poses = trajectory.t_s, trajectory.poses
+    if first_s < t_s[0]:
+        t_s, poses = np.concatenate([[first_s], t_s]), np.concatenate([poses[:1], poses])
+    if last_s > t_s[-1]:
+        t_s, poses = np.concatenate([t_s, [last_s]]), np.concatenate([poses, poses[-1:]])
+    return Trajectory(t_s, poses)
 
 
 def run_ratslam(observations: Iterable[Observation], config: RatSlamConfig | None = None) -> tuple[RatSlamMap, float]:

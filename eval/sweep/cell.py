@@ -122,7 +122,7 @@ def _locked(plan: RecordingPlan) -> Iterator[None]:
 
 def _samples(row: Row, evidence: Path) -> dict[str, Samples]:
     """The errors behind a row's figures, scored again from the trajectories that the evaluation left."""
-    method = method_of(row.method)
+    method = method_of(row.method, row.declaration.frame if row.declaration else None)
     path = evidence / f"{method.stem}.tum"
     if row.ape is None or not path.exists():
         return {}

@@ -12,6 +12,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from hippodrome.eval.contest.entry import Added, entries_of, with_methods
+from hippodrome.eval.contest.sources import methods_sha256
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.reuse import figure_code_sha256
 from hippodrome.eval.sweep.executors import SweepError
@@ -50,7 +52,7 @@ class SweepCell:
     @property
     def key(self) -> str:
         """Name of the cell's folder, made of its whole configuration and of the code: nothing stale is taken for finished."""
-        text = json.dumps([self.scenario.model_dump_json(), cell_code_sha256()])
+        text = json.dumps([self.scenario.model_dump_json(), cell_code_sha256(), *methods_sha256(self.scenario)])
         return f"{self.scenario.name}-{self.scenario.seed}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
 
 
@@ -66,13 +68,16 @@ def parse_parameter(text: str) -> Parameter:
     return Parameter(key, tuple(found))
 
 
-def make_grid(paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Sequence[Parameter]) -> list[SweepCell]:
+def make_grid(
+    paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Sequence[Parameter], methods: Sequence[Added] = ()
+) -> list[SweepCell]:
     """All cells of the grid, the last parameter's values changing fastest.
 
     Args:
         paths: The scenarios' files.
         seeds: Seeds that replace the scenarios' own; None: their own.
         parameters: Keys and the values that they take in turn.
+        methods: Methods that take part beside ours and those that a scenario names.
 
     Raises:
         HippodromeError: A file is no scenario, a key or value cannot be set, a cell is there twice, or there are too many.
@@ -83,7 +88,10 @@ def make_grid(paths: Sequence[Path], seeds: Sequence[int] | None, parameters: Se
     if count > MAX_CELLS:
         raise SweepError(f"{count} cells, the limit is {MAX_CELLS}")
     chosen: Sequence[int | None] = seeds or (None,)
-    cells = [cell for path in paths for seed in chosen for cell in _cells(read_scenario(path, None, seed), parameters)]
+    scenarios = [with_methods(read_scenario(path, None, seed), methods) for path in paths for seed in chosen]
+    cells = [cell for scenario in scenarios for cell in _cells(scenario, parameters)]
+    for cell in cells:
+        entries_of(cell.scenario)  # a method that cannot be loaded is said before anything is run
     seen: dict[tuple[str, int, str], SweepCell] = {}
     for cell in cells:
         if seen.setdefault((cell.scenario.name, cell.scenario.seed, cell.label), cell) is not cell:
@@ -99,7 +107,7 @@ def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
     for part in parents:
         if part == "noise" and isinstance(place[part], str):  # a level's name stands for its values
             place[part] = NOISE_LEVELS[place[part]].model_dump()
-        place = place.get(part)
+        place = place.setdefault(part, {}) if parents[0] == "methods" and part == "config" else place.get(part)
         if not isinstance(place, dict):
             raise SweepError(f"--set {key}: '{part}' has no keys of its own; see docs/scenarios.md")
     place[last] = value

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from hippodrome._files import write_atomically
+from hippodrome.eval.contest.entry import Added
 from hippodrome.eval.pool import progress_bar
 from hippodrome.eval.results.model import Results, to_json, write_results
 from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
@@ -30,6 +31,7 @@ def sweep(
     workers: int,
     scheduler: str | None,
     out: Path,
+    methods: Sequence[Added] = (),
 ) -> bool:
     """Run the cells that are not finished, then merge all; whether every cell has a result.
 
@@ -40,12 +42,13 @@ def sweep(
         workers: How many processes of this machine to use.
         scheduler: Address of a Dask cluster's scheduler to run on instead; None: run here.
         out: Folder for the merged results, the cells, and the recordings that they share.
+        methods: Methods that take part beside ours and those that a scenario names.
 
     Raises:
         HippodromeError: Bad input, or nobody answers at the scheduler's address.
     """
     out = out.resolve()  # a cluster's workers have a working directory of their own
-    cells = make_grid(paths, seeds, parameters)
+    cells = make_grid(paths, seeds, parameters, methods)
     if scheduler is None:
         require_gl()
     executors = dask_cluster(scheduler) if scheduler else local_processes(workers)
@@ -82,7 +85,8 @@ def _recordings(cells: Sequence[SweepCell], out: Path) -> list[RecordingTask]:
 def _driven(cell: SweepCell) -> Any:
     """The scenario with defaults for all that no drive depends on: cells that differ only in these share their recordings."""
     fields = type(cell.scenario).model_fields
-    return cell.scenario.model_copy(update={name: fields[name].default for name in DRIVE_INDEPENDENT_KEYS})
+    defaults = {name: fields[name].get_default(call_default_factory=True) for name in DRIVE_INDEPENDENT_KEYS}
+    return cell.scenario.model_copy(update=defaults)
 
 
 def _let_pass(_: RecordingTask, __: str | Failure) -> None:

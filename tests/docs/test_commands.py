@@ -30,6 +30,7 @@ EXPENSIVE = {  # parsed only; what runs them instead
     "stress": "half a minute a case; tests/eval/trials/stress runs its parts",
     "robustness": "minutes; tests/eval/trials/robustness runs its parts",
     "baselines": "most of an hour; tests/eval/trials/rivals and tests/eval/rivals run short drives",
+    "method": "half a minute a method; tests/eval/contest runs its parts",
     "run": "a drive and a map; tests/eval/real runs small ones",
     "gate": "an evaluation a seed; tests/eval/gate judges stored results. `gate --power` is run",
 }
@@ -77,7 +78,7 @@ def _alternatives(group):
 
 def _choices(text):
     """``--from {tum,kitti}`` and ``--axes body|camera``, once for each."""
-    if not (found := re.search(r"\{([\w,]+)\}|(?<= )(\w+(?:\|\w+)+)", text)):
+    if not (found := re.search(r"\{(\w+(?:,\w+)+)\}|(?<= )(\w+(?:\|\w+)+)", text)):
         return [text]
     words = re.split(r"[,|]", found[1] or found[2])
     return [one for word in words for one in _choices(text.replace(found[0], word))]

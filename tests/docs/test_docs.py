@@ -26,6 +26,7 @@ FOREIGN = {  # names of other programs' things, and of the Python language
 PLACEHOLDERS = {"SCENARIO", "METHOD", "RUN", "NN", "KEY", "NEW_DIR", "NUMBER", "N", "FILE", "NAME", "FOLDER", "SOURCE", "DIR"}
 OF_A_READER = {  # files that a reader has, makes, or is shown as an example
     "my_town.osm", "my-town.yaml", "my-town.net.xml.gz", "my-town", "town.yaml", "town.net.xml", "map.osm", "FILE.csv",
+    "my_module.py", "./run.sh", "run.sh", "./stream_client",
     "FILE.tum", "FILE.rrd", "topometric*-ape.zip", "wheels.csv",
 }  # fmt: skip
 DENSITIES = {"belief", "belief_2d"}  # Eqs. (1) and (2): the networks carry these densities' parameters, tests hold them to SciPy

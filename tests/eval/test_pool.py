@@ -1,6 +1,7 @@
 """Tasks over processes: results in order, tasks that follow from results, and an end without a traceback when interrupted."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -43,4 +44,13 @@ def test_an_interrupt_ends_busy_and_idle_workers_quietly_unless_it_is_ignored(tm
         assert process.stdout.readline() == "ready\n"
         os.killpg(process.pid, signal.SIGINT)
         said = process.communicate(timeout=30)[1]
-    assert (process.returncode, said) == (status, "")
+    complaints = [line for line in said.splitlines() if not re.fullmatch(r"wait: \d of 4 done", line)]
+    assert (process.returncode, complaints) == (status, [])
+
+
+def test_without_a_terminal_each_quarter_of_a_stage_is_a_line(capsys):
+    with worker_pool(1) as pool:
+        pool.run("size", abs, list(range(8)))
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[-1] == "size: 8 of 8 done"
+    assert 1 <= len(lines) <= 5

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.files.trajectories import read_tum
 from hippodrome.eval.methods.method import method_of
 from hippodrome.eval.methods.stages import dead_reckoning
+from hippodrome.eval.results.model import read_results
 from hippodrome.proto.codec import load_map
 from hippodrome.sim.network import read_network
 from hippodrome.sim.recording import MANIFEST, Recording, open_recording
@@ -101,6 +103,7 @@ def _scenario_drives(folder: Path, network: Path | None) -> Iterator[ExportedDri
     """The mapping and the localization drive of one scenario. Raises ExchangeError if the recording of one of them is gone."""
     root = folder.parent
     estimates = {path.stem: read_tum(path) for path in sorted(folder.glob("*.tum"))}
+    declared = _declared_frames(folder)
     maps = {path.stem: load_map(path)[0] for path in sorted(folder.glob("*.pbstream"))}
     for role, reference in TRUTH.items():
         if (truth := estimates.get(reference)) is None:
@@ -108,25 +111,42 @@ def _scenario_drives(folder: Path, network: Path | None) -> Iterator[ExportedDri
         recording = _recording_of(truth, root, f"{folder.name}-{role}-*")
         mine = {name: value for name, value in estimates.items() if _role_of(name) == role and name not in TRUTH.values()}
         name, roads = f"{folder.name}-{role}", network or _network_file(recording, root)
-        drive = _drive(name, recording, mine, maps, roads)
+        drive = _drive(name, recording, mine, maps, roads, declared)
         if role == "localization":
             drive = replace(drive, map_truth=estimates.get(TRUTH["mapping"]), maps_finished=True)
         yield drive
 
 
 def _drive(
-    name: str, recording: Recording, found: dict[str, Trajectory], maps: dict[str, CognitiveMap], network: Path | None
+    name: str,
+    recording: Recording,
+    found: dict[str, Trajectory],
+    maps: dict[str, CognitiveMap],
+    network: Path | None,
+    declared: Mapping[str, str] = MappingProxyType({}),
 ) -> ExportedDrive:
-    estimates = {method: Estimate(trajectory, _frame_of(method)) for method, trajectory in found.items()}
+    estimates = {method: Estimate(trajectory, _frame_of(method, declared)) for method, trajectory in found.items()}
     if DEAD_RECKONING not in estimates:
         estimates[DEAD_RECKONING] = Estimate(dead_reckoning(recording.self_motion())[0], "own")
     roads = read_network(network) if network is not None else None
     return ExportedDrive(name, recording, truth_of(recording), estimates, maps, roads, network)
 
 
-def _frame_of(method: str) -> Literal["network", "own"]:
-    """Refinement and localization answer in the network's frame, everything else in a frame of its own."""
-    return "network" if method_of(method).frame == "network" else "own"
+def _frame_of(method: str, declared: Mapping[str, str]) -> Literal["network", "own"]:
+    """Refinement and localization answer in the network's frame, as do methods that say so; others in a frame of their own."""
+    frame = declared.get(method) or method_of(method).frame
+    return (
+        "network" if frame == "network" or (method.endswith(LOCALIZED) and method.removesuffix(LOCALIZED) in declared) else "own"
+    )
+
+
+def _declared_frames(folder: Path) -> dict[str, str]:
+    """The frame that each method of a scenario's results declares, by the stem of its files; empty without such results."""
+    path = folder.parent / "results.json"
+    if not path.is_file():
+        return {}
+    rows = [row for scenario in read_results(path).scenarios if scenario.name == folder.name for row in scenario.rows]
+    return {method_of(row.method).stem: row.declaration.frame for row in rows if row.declaration is not None}
 
 
 def _role_of(stem: str) -> str:

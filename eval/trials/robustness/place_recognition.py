@@ -24,12 +24,9 @@ from hippodrome.core.views import keyframes
 from hippodrome.core.views.descriptors import ViewCellConfig, describe
 from hippodrome.core.views.scoring import QueryMean, make_bank, score, template_mean
 from hippodrome.core.views.sequence import SequenceConfig, Step
+from hippodrome.eval.metrics.places import MAPPED_M, MAPPED_RAD, SAME_M, SAME_RAD
 from hippodrome.sim.recording import Recording
 
-# A query can be recognised if a place lies this near and faces the same way.
-MAPPED_M, MAPPED_RAD = 5.0, np.deg2rad(30.0)
-# An answer this near is the same place. A query that has no place this near is on an unmapped road.
-SAME_M, SAME_RAD = 15.0, np.deg2rad(60.0)
 # Share of the places that is struck from the map, those farthest west: as many unmapped roads as a half-known town has.
 STRUCK: Final = 0.25
 # OpenRatSLAM's template: 60x10 pixels, grey, normalised by patches, compared at shifts of up to 5 columns to either side.

@@ -9,7 +9,8 @@ from typing import Any, Final
 import numpy as np
 
 from hippodrome.core.types import FloatArray
-from hippodrome.eval.trials.robustness.place_recognition import MAPPED_M, SAME_M, STRUCK, Answers
+from hippodrome.eval.metrics.places import MAPPED_M, SAME_M
+from hippodrome.eval.trials.robustness.place_recognition import STRUCK, Answers
 
 PRECISION: Final = 0.99  # the recall at this precision is the figure of the tables
 DEFINITION: Final = (

@@ -8,6 +8,7 @@ from hippodrome.eval.methods.method import ORBSLAM3_FINAL, ORBSLAM3_LIVE
 from hippodrome.eval.report.report import report_html
 from hippodrome.eval.results.fairness import GIVEN, fairness_rows
 from hippodrome.eval.results.model import (
+    Declaration,
     Network,
     Results,
     ResultsError,
@@ -51,5 +52,12 @@ def test_a_broken_table_is_named(results, tmp_path):
 
 
 def test_what_each_method_is_given_is_said_once(results, tmp_path):
-    assert [line[0] for line in fairness_rows([row.method for row in ROWS])] == ["topometric", "ORB-SLAM3"]
+    assert [line[0] for line in fairness_rows(ROWS)] == ["topometric", "ORB-SLAM3"]
     assert report_html(results, tmp_path).count(GIVEN["ORB-SLAM3"][0]) == 1
+
+
+def test_a_method_that_is_not_ours_says_itself_what_it_is_given():
+    said = Declaration(frame="metric", given="self-motion, the road network", source="exec:./run", isolated=True)
+    (line,) = fairness_rows([Row(method="theirs", failure="crashed", declaration=said)])
+    assert line[:3] == ["theirs", "self-motion, the road network", "best rigid fit, SE(2)"]
+    assert line[3].startswith("a process of its own, with nothing of the truth")

@@ -74,7 +74,7 @@ def test_a_run_whose_map_failed_makes_no_picture(run):
 def test_table_holds_measured_and_quoted_rows():
     text = with_table(f"before {BEGIN}old{END} after", result("semi-metric", "topometric"), quoted_rows())
     assert text.startswith("before ") and text.endswith(" after") and "old" not in text
-    assert "| topometric | - | 1.25 | - | 0.34 |" in text
+    assert "| topometric | - | 1.25 | - | - | - | 0.34 |" in text
     assert all(f"| {row.method} †" in text for row in quoted_rows())
 
 

@@ -93,3 +93,30 @@ def test_the_terminal_shows_the_same(width):
     assert "rural: generated, rural, 7.2 km of road, seed 4, noise paper, 14,717 frames" in " ".join(text.split())
     assert "12.3" in text  # the worst error
     assert "…" not in text
+
+
+def refused_results():
+    rows = (
+        Row(method="semi-metric", ape=error(90.0), ape_sim2=error(1.5)),
+        Row(method="topometric", ape=error(761.0), ape_sim2=error(2.5), refused="all of its 3 vertices; drive farther"),
+        Row(method="topometric (paper)", ape=error(3.0), ape_sim2=error(2.0)),
+    )
+    return Results(scenarios=(results().scenarios[0].model_copy(update={"rows": rows}),))
+
+
+def test_a_refused_map_is_seen_to_be_refused():
+    markdown = table_one_markdown(refused_results())
+    row = dict(zip(cells(markdown, "Method"), cells(markdown, "topometric (REFUSED)"), strict=True))
+    assert row["APE (m)"] == "(761.00)"
+    assert "- topometric: REFUSED: all of its 3 vertices; drive farther" in markdown
+    stream = StringIO()
+    print_table_one(refused_results(), (), Console(file=stream, width=80))
+    assert "topometric REFUSED" in stream.getvalue()
+    assert "(761)" in stream.getvalue()
+    assert "topometric: REFUSED: all of its 3 vertices; drive farther" in stream.getvalue()
+
+
+def test_where_an_aligned_rival_is_better_a_sentence_says_so():
+    sentence = "semi-metric is better here than any map on the roads: 1.50 m, topometric (paper) 2.00 m."
+    assert sentence in table_one_markdown(refused_results())
+    assert "similarity fit, " not in table_one_markdown(results())

@@ -10,7 +10,7 @@ from hippodrome.core.mapping.mapper import MapperConfig, map_drive
 from hippodrome.core.types import HippodromeError, Observation
 from hippodrome.eval.rivals.orbslam3.stage import stereo_scenario
 from hippodrome.eval.rivals.rows import (
-    _ratslam,
+    RatSlamMethod,
     map_without_attractor,
     run_ratslam,
     save_ratslam,
@@ -78,4 +78,4 @@ def test_the_stereo_camera_sees_the_same_drive(tmp_path):
 
 def test_a_drive_too_long_for_ratslam_is_a_row_that_says_so():
     with pytest.raises(HippodromeError, match="not run: the drive takes 4000 s"):
-        _ratslam(SimpleNamespace(duration_s=4000.0), np.zeros(1))
+        RatSlamMethod().map(iter(()), SimpleNamespace(duration_s=4000.0))

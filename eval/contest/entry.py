@@ -1,0 +1,212 @@
+"""Entries: the methods that take part in an evaluation, ours and others, each ready to be run."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import BaseModel, ValidationError
+
+from hippodrome.eval.contest.process import can_conceal
+from hippodrome.eval.contest.program import ProgramLocalizer, ProgramMapper
+from hippodrome.eval.contest.stream import StreamLocalizer, StreamMapper
+from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, stem_of
+from hippodrome.eval.methods.ours import DeadReckoning, SemiMetric, Topometric, TopometricPaper
+from hippodrome.eval.methods.protocol import Describes, Localizes, Maps, MethodError, Needs
+from hippodrome.eval.results.model import Declaration
+from hippodrome.eval.rivals.rows import NoAttractor, RatSlamMethod
+from hippodrome.sim.method_spec import MethodSpec
+from hippodrome.sim.scenario import METHOD_NAME, Scenario
+
+# In the order of the tables. They are made and run as everybody's methods are.
+BUILT_IN: Final[tuple[type[Any], ...]] = (DeadReckoning, SemiMetric, RatSlamMethod, NoAttractor, TopometricPaper, Topometric)
+GROUP: Final = "hippodrome.methods"  # of entry points, by which an installed package makes its methods known
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry:
+    """A method that takes part: what it is called, what it is given, and the object that does the work."""
+
+    method: Method
+    runner: Any  # an object with map, localize or describe
+    needs: Needs
+    builds_on: str | None = None  # key of the method on whose map it builds
+    source: str = "hippodrome"  # where it comes from, for the report
+    apart: bool = False  # whether it runs in a process of its own
+
+    @property
+    def declaration(self) -> Declaration:
+        """What its row says of it."""
+        base = f"the map of {self.builds_on}, " if self.builds_on is not None and self.source != "hippodrome" else ""
+        return Declaration(
+            frame=self.method.frame, given=base + self.needs.in_words(), source=self.source, isolated=self.apart and can_conceal()
+        )
+
+    @property
+    def does(self) -> tuple[str, ...]:
+        """Which of ``map``, ``localize`` and ``describe`` it can."""
+        protocols = {"map": Maps, "localize": Localizes, "describe": Describes}
+        return tuple(name for name, protocol in protocols.items() if isinstance(self.runner, protocol))
+
+
+@dataclass(frozen=True, slots=True)
+class Added:
+    """A method that the command line adds to every scenario."""
+
+    name: str | None
+    spec: MethodSpec
+
+
+def parse_method(text: str) -> Added:
+    """What ``--method`` names: a class, ``exec:COMMAND``, ``stream:COMMAND`` or an installed method, each after ``NAME=`` or not.
+
+    Raises:
+        ValueError: It is none of these; the message says what is expected.
+    """
+    found = re.match(r"^([A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39})=(.*)$", text, re.DOTALL)
+    name, source = (found.group(1), found.group(2)) if found else (None, text)
+    kind, _, rest = source.partition(":")
+    if not rest:
+        installed = {point.name: point.value for point in entry_points(group=GROUP)}
+        if source not in installed:
+            names = ", ".join(sorted(installed)) or "there is none"
+            raise ValueError(
+                f"'{source}' is neither module:Class, exec:COMMAND nor stream:COMMAND, nor an installed method ({names})"
+            )
+        name, source = name or source, installed[source]
+    try:
+        spec = MethodSpec.model_validate(source)
+    except ValidationError as error:
+        raise ValueError(f"'{text}': {error.errors(include_url=False)[0]['msg'].removeprefix('Value error, ')}") from None
+    return Added(name or (_program_name(rest) if kind in ("exec", "stream") else None), spec)
+
+
+def with_methods(scenario: Scenario, added: Sequence[Added]) -> Scenario:
+    """The scenario with methods added to its own, as if they stood in its file. Raises MethodError if two have one name."""
+    methods = dict(scenario.methods)
+    for one in added:
+        name = one.name
+        if name is None:
+            assert one.spec.class_ is not None
+            cls = load_class(one.spec.class_)
+            name = _card(str(getattr(cls, "label", cls.__name__)), "own").label
+        if name in methods:
+            raise MethodError(f"method {name}: there is one of this name already; give it another, NAME=...")
+        methods[name] = one.spec
+    return scenario.model_copy(update={"methods": methods})
+
+
+def entries_of(scenario: Scenario) -> list[Entry]:
+    """All entries of one scenario: ours, then those that it names.
+
+    Raises:
+        MethodError: A method cannot be loaded, or two have one name.
+    """
+    ours = [_entry_of(cls, cls.card, _made(cls, {}, scenario, cls.card.label), "hippodrome") for cls in BUILT_IN]
+    theirs = [_foreign(name, spec, scenario) for name, spec in scenario.methods.items()]
+    entries = [*ours, *theirs]
+    _require_names(entries)
+    return entries
+
+
+def load_class(reference: str) -> type[Any]:
+    """The class of ``module:Class``; the working directory is searched as well. Raises MethodError."""
+    module_name, _, class_name = reference.partition(":")
+    if str(Path.cwd()) not in sys.path:
+        sys.path.append(str(Path.cwd()))
+    try:
+        found: Any = importlib.import_module(module_name)
+        for part in class_name.split("."):
+            found = getattr(found, part)
+    except ModuleNotFoundError as error:
+        raise MethodError(
+            f"method {reference}: there is no module '{error.name}'; install it, or run in the folder that has it"
+        ) from None
+    except AttributeError:
+        raise MethodError(f"method {reference}: the module has no '{class_name}'") from None
+    except Exception as error:
+        raise MethodError(f"method {reference}: importing it failed: {type(error).__name__}: {error}") from error
+    if not isinstance(found, type):
+        raise MethodError(f"method {reference}: '{class_name}' is a {type(found).__name__}, not a class")
+    return found
+
+
+def _foreign(name: str, spec: MethodSpec, scenario: Scenario) -> Entry:
+    """The entry of a method that is not ours."""
+    if spec.class_ is None:
+        return _program(name, spec)
+    cls = load_class(spec.class_)
+    method = _card(name, str(spec.frame or getattr(cls, "frame", "own")))
+    return _entry_of(cls, method, _made(cls, spec.config, scenario, method.label), spec.class_)
+
+
+def _program(name: str, spec: MethodSpec) -> Entry:
+    """The entry of a program, in a process of its own."""
+    command = spec.command or spec.stream or ""
+    mapper, localizer = (StreamMapper, StreamLocalizer) if spec.stream else (ProgramMapper, ProgramLocalizer)
+    runner = localizer(spec) if spec.localize else mapper(spec)
+    needs = Needs(road_network="road_network" in spec.needs, start_pose="start_pose" in spec.needs)
+    source = f"{'stream' if spec.stream else 'exec'}:{command}"
+    return Entry(_card(name, spec.frame or "own"), runner, needs, None, source, apart=True)
+
+
+def _card(label: str, frame: str) -> Method:
+    if not re.match(METHOD_NAME, label):
+        raise MethodError(f"method '{label}': this cannot be its name: letters, digits, blanks and . _ + ( ) , - up to 40")
+    if frame not in ALIGNMENTS:
+        raise MethodError(f"method {label}: frame '{frame}' is unknown; use one of {', '.join(ALIGNMENTS)}")
+    stem = stem_of(label)
+    return Method(stem, label, frame, stem, map_file=f"{stem}.pbstream")
+
+
+def _entry_of(cls: type[Any], method: Method, runner: Any, source: str) -> Entry:
+    needs = getattr(cls, "needs", Needs())
+    if not isinstance(needs, Needs):
+        raise MethodError(f"method {method.label}: its needs are a {type(needs).__name__}, not a hippodrome Needs")
+    entry = Entry(method, runner, needs, getattr(cls, "builds_on", None), source)
+    if not entry.does:
+        raise MethodError(f"method {method.label}: it has none of the functions map, localize and describe")
+    return entry
+
+
+def _made(cls: type[Any], config: dict[str, Any], scenario: Scenario, label: str) -> Any:
+    """An object of a method's class: from the whole scenario, from a configuration of its own, or from nothing."""
+    try:
+        if hasattr(cls, "of_scenario"):
+            return cls.of_scenario(scenario)
+        own = getattr(cls, "Config", None)
+        if isinstance(own, type) and issubclass(own, BaseModel):
+            return cls(own.model_validate(config))
+        return cls(**config)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise MethodError(f"method {label}: config.{place}: {first['msg']}") from None
+    except Exception as error:
+        raise MethodError(f"method {label}: it cannot be made: {type(error).__name__}: {error}") from error
+
+
+def _require_names(entries: Iterable[Entry]) -> None:
+    """Raise MethodError if two entries have one name, or the name of a row that ORB-SLAM3 has, or build on nothing."""
+    entries, taken = list(entries), set[str]()
+    reserved = {method.stem for method in METHODS} - {cls.card.stem for cls in BUILT_IN}
+    for entry in entries:
+        if entry.method.stem in taken | reserved:
+            raise MethodError(f"method {entry.method.label}: there is one of this name already; give it another, NAME=...")
+        taken.add(entry.method.stem)
+    keys = [entry.method.key for entry in entries]
+    for entry in entries:
+        if entry.builds_on is not None and entry.builds_on not in keys:
+            raise MethodError(f"method {entry.method.label}: it builds on '{entry.builds_on}'; there are {', '.join(keys)}")
+
+
+def _program_name(command: str) -> str:
+    """A name for a program that was given none: that of its file."""
+    words = command.split()
+    return re.sub(r"[^A-Za-z0-9._+-]", "-", Path(words[0]).stem if words else "program").lstrip("-._+")[:40] or "program"

@@ -1,0 +1,53 @@
+"""Methods that only describe frames, run on both drives: frames in, vectors out; their poses stay with the harness."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter, process_time
+from typing import Any, Final
+
+import numpy as np
+
+from hippodrome.core.types import FloatArray, Frame
+from hippodrome.eval.methods.materials import Materials
+from hippodrome.eval.methods.protocol import MethodError
+from hippodrome.eval.metrics.places import PlaceScore, score_places
+from hippodrome.eval.metrics.trajectory import path_length_m
+from hippodrome.sim.recording import Recording
+
+PLACE_M: Final = 2.0  # between two frames of the first drive: as dense as a map's views are at most
+QUERY_M: Final = 5.0  # between two frames of the second drive
+
+
+def recognise(label: str, describe: Callable[[Frame], Any], materials: Materials) -> tuple[PlaceScore, float, FloatArray]:
+    """The score of a descriptor, the CPU seconds that it took, and the seconds (N,) for each frame. Raises MethodError."""
+    began = process_time()
+    places, place_poses_m, place_s = _described(label, describe, materials.mapping, PLACE_M)
+    queries, query_poses_m, query_s = _described(label, describe, materials.drive, QUERY_M)
+    if places.shape[1] != queries.shape[1]:
+        raise MethodError(f"{label}: describe() gave {places.shape[1]} numbers, and later {queries.shape[1]}")
+    score = score_places(places, place_poses_m, queries, query_poses_m)
+    return score, process_time() - began, np.concatenate([place_s, query_s])
+
+
+def _described(
+    label: str, describe: Callable[[Frame], Any], drive: Recording, spacing_m: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Descriptors (N, D), true poses (N, 3) and times (N,) of the first frame in each stretch of a drive."""
+    steps = drive.samples.frame_steps
+    stretch = np.floor(path_length_m(drive.samples.poses_m)[steps] / spacing_m)
+    chosen = steps[np.concatenate([[True], np.diff(stretch) > 0])]
+    vectors, took_s = [], []
+    for step in chosen:
+        frame = drive.frame(int(drive.samples.frame[step]))
+        began = perf_counter()
+        vector = describe(frame)
+        took_s.append(perf_counter() - began)
+        try:
+            vectors.append(np.asarray(vector, dtype=np.float64).ravel())
+        except (TypeError, ValueError) as error:
+            raise MethodError(f"{label}: describe() gave no vector of numbers ({error})") from None
+        if len(vectors[-1]) != len(vectors[0]) or not np.isfinite(vectors[-1]).all():
+            sizes = f"{len(vectors[-1])} numbers, {len(vectors[0])} at first"
+            raise MethodError(f"{label}: describe() gave {sizes}; as many are expected for every frame, all of them finite")
+    return np.array(vectors), drive.samples.poses_m[chosen], np.array(took_s)

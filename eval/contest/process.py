@@ -1,0 +1,221 @@
+"""A foreign program in a process of its own: limits of time and memory, and what it took of both."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import shlex
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import IO, Final
+
+from hippodrome.eval.methods.protocol import MethodError
+
+POLL_S: Final = 0.05  # between two looks at a process: its memory is looked at as well
+FILE_BYTES: Final = 4 << 30  # the longest file that a program may write, its printed text included
+LAST_WORDS: Final = 300  # characters of what a program printed last that an error quotes
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a program may take."""
+
+    time_s: float
+    memory_bytes: int  # address space of each process, and memory of all of them together
+
+
+@dataclass(slots=True)
+class Process:
+    """A running program. ``wait`` ends it; how it ended and what it took is known from then on."""
+
+    popen: subprocess.Popen[bytes]
+    limits: Limits
+    log: Path  # what it prints, on standard error at least
+    began_s: float = field(default_factory=time.monotonic)
+    cpu_s: float = 0.0  # user and system time of it and of the processes that it waited for
+    peak_rss_bytes: int = 0
+    status: int | None = None
+    stopped: str | None = None  # why it was stopped, if it was
+
+    @property
+    def left_s(self) -> float:
+        """Time that it has left."""
+        return self.began_s + self.limits.time_s - time.monotonic()
+
+    def poll(self) -> bool:
+        """Whether it has ended; it is stopped here if it is past a limit."""
+        if self.status is not None:
+            return True
+        pid, status, usage = os.wait4(self.popen.pid, os.WNOHANG)
+        if pid == 0:
+            if self.left_s <= 0.0:
+                self.stop(f"hung: no end after {self.limits.time_s:g} s, its limit")
+            elif (held := self.look()) > self.limits.memory_bytes:
+                self.stop(f"took {held / 1e6:.0f} MB of memory, more than its limit of {self.limits.memory_bytes / 1e6:.0f} MB")
+            return self.status is not None
+        self._ended(status, usage)
+        return True
+
+    def look(self) -> int:
+        """Memory [bytes] that it and the processes of its group hold together now; the most that one of them held is remembered.
+
+        The kernel's figure for a process that has ended (``ru_maxrss``) begins with the memory of the one that started it.
+        """
+        held = 0
+        for entry in Path("/proc").iterdir():
+            if entry.name.isdigit():
+                with contextlib.suppress(OSError, ValueError, IndexError):
+                    fields = (entry / "stat").read_text().rpartition(")")[2].split()
+                    if int(fields[2]) == self.popen.pid:
+                        held += int(fields[21]) * resource.getpagesize()
+                        peak = 1024 * int((entry / "status").read_text().split("VmHWM:")[1].split()[0])
+                        self.peak_rss_bytes = max(peak, self.peak_rss_bytes)
+        return held
+
+    def stop(self, cause: str) -> None:
+        """End it and all processes of its group, and remember why."""
+        if self.status is None:
+            self.stopped = cause
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.popen.pid, signal.SIGKILL)
+            _, status, usage = os.wait4(self.popen.pid, 0)
+            self._ended(status, usage)
+
+    def wait(self) -> None:
+        """Until it ends by itself or is past a limit. Raises MethodError unless it ended well."""
+        while not self.poll():
+            time.sleep(POLL_S)
+        if (cause := self.failure()) is not None:
+            raise MethodError(cause)
+
+    def failure(self) -> str | None:
+        """Why it did not end well; None if it did, or still runs."""
+        if self.stopped is not None:
+            return self.stopped
+        if self.status in (None, 0):
+            return None
+        assert self.status is not None
+        how = f"exit status {self.status}"
+        if self.status < 0:
+            how = f"crashed: signal {-self.status} ({_signal_name(-self.status)})"
+        return f"{how}; its last words: {last_words(self.log)}"
+
+    def _ended(self, status: int, usage: resource.struct_rusage) -> None:
+        self.status = self.popen.returncode = os.waitstatus_to_exitcode(status)
+        self.cpu_s = usage.ru_utime + usage.ru_stime
+        with contextlib.suppress(ProcessLookupError, PermissionError):  # what it left behind
+            os.killpg(self.popen.pid, signal.SIGKILL)
+
+
+@contextmanager
+def started(
+    command: Sequence[str], folder: Path, limits: Limits, concealed: Sequence[Path] = (), fed: bool = False
+) -> Iterator[Process]:
+    """A program while it runs; it does not outlive the context.
+
+    Args:
+        command: Its words. It is started in the working directory, so that it can be named by a relative path.
+        folder: Where ``log.txt`` with all that it prints goes.
+        limits: What it may take.
+        concealed: Folders that it shall not see, where the system allows that.
+        fed: Whether its standard input and output are pipes; then only what it prints on standard error goes to the log.
+
+    Raises:
+        MethodError: There is no such program, or it cannot be run.
+    """
+    log = folder / "log.txt"
+    pipe = subprocess.PIPE if fed else subprocess.DEVNULL
+    with log.open("ab") as stream:
+        if shutil.which(command[0]) is None:
+            raise MethodError(f"there is no program '{command[0]}', or it may not be run; name it by a path, and chmod +x it")
+        words = _concealing(concealed) + [str(word) for word in command]
+        try:
+            popen = subprocess.Popen(
+                words, stdin=pipe, stdout=subprocess.PIPE if fed else stream, stderr=stream, start_new_session=True
+            )
+        except OSError as error:
+            cure = "does it begin with #! and its interpreter?"
+            raise MethodError(f"'{command[0]}' cannot be started: {error.strerror}; {cure}") from None
+    _limit(popen.pid, limits)
+    process = Process(popen, limits, log)
+    process.look()
+    try:
+        yield process
+    finally:
+        process.stop("ended with the evaluation")
+        for end in (popen.stdin, popen.stdout):
+            _close(end)
+
+
+def command_words(text: str, **places: Path) -> list[str]:
+    """The words of a command, with folders in place of ``{sequence}``, ``{out}`` and ``{map}``. Raises MethodError."""
+    try:
+        words = shlex.split(text)
+    except ValueError as error:
+        raise MethodError(f"'{text}' is not a command: {error}") from None
+    if not words:
+        raise MethodError("its command is empty")
+    for name, path in places.items():
+        words = [word.replace(f"{{{name}}}", str(path)) for word in words]
+    return words
+
+
+def last_words(log: Path) -> str:
+    """The last line that a program printed, shortened."""
+    with log.open("rb") as stream:
+        stream.seek(0, os.SEEK_END)
+        stream.seek(max(stream.tell() - 4096, 0))
+        lines = stream.read().decode(errors="replace").splitlines()
+    found = next((line.strip() for line in reversed(lines) if line.strip()), "none")
+    return "".join(letter if letter.isprintable() else "?" for letter in found)[:LAST_WORDS]
+
+
+@cache
+def can_conceal() -> bool:
+    """Whether this system lets a program have a mount namespace of its own, in which folders can be covered."""
+    if shutil.which("unshare") is None or shutil.which("mount") is None:
+        return False
+    trial = ["unshare", "--user", "--map-root-user", "--mount", "mount", "-t", "tmpfs", "none", "/tmp"]
+    try:
+        return subprocess.run(trial, capture_output=True, timeout=10.0, check=False).returncode == 0
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+
+
+def _concealing(folders: Sequence[Path]) -> list[str]:
+    """Words before a command by which it finds these folders empty."""
+    if not folders or not can_conceal():
+        return []
+    cover = 'mount -t tmpfs -o size=4k none "$1" || exit 125'
+    script = f'n=$1; shift; while [ "$n" -gt 0 ]; do {cover}; shift; n=$((n-1)); done; exec "$@"'
+    covered = [str(folder.resolve()) for folder in folders]
+    return ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", script, "sh", str(len(covered)), *covered]
+
+
+def _limit(pid: int, limits: Limits) -> None:
+    """Limits of the system for a process that has just begun; it and its children keep them."""
+    with contextlib.suppress(ProcessLookupError, PermissionError, ValueError):
+        resource.prlimit(pid, resource.RLIMIT_AS, (limits.memory_bytes, limits.memory_bytes))
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
+        resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0))
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return "unknown"
+
+
+def _close(stream: IO[bytes] | None) -> None:
+    if stream is not None:
+        with contextlib.suppress(BrokenPipeError, OSError):
+            stream.close()

@@ -1,0 +1,41 @@
+"""Hashes of what the methods of a scenario are made of, so that no result of older code is taken for one of theirs."""
+
+from __future__ import annotations
+
+import hashlib
+import shlex
+from importlib.util import find_spec
+from pathlib import Path
+
+from hippodrome._files import sha256_of
+from hippodrome.sim.method_spec import MethodSpec
+from hippodrome.sim.scenario import Scenario
+
+
+def methods_sha256(scenario: Scenario) -> list[str]:
+    """One hash for each method that the scenario names, none if it names none."""
+    return [_sha256(spec) for spec in scenario.methods.values()]
+
+
+def _sha256(spec: MethodSpec) -> str:
+    """Hash of a class's module, or of the files that a command names. What these use in turn is not in it."""
+    files = [_module_file(spec.class_)] if spec.class_ is not None else []
+    for command in (spec.command, spec.stream, spec.localize):
+        files += [Path(word) for word in _words(command)]
+    known = [sha256_of(path) for path in files if path is not None and path.is_file()]
+    return hashlib.sha256("".join(known).encode()).hexdigest()
+
+
+def _module_file(reference: str) -> Path | None:
+    try:
+        found = find_spec(reference.partition(":")[0])
+    except (ImportError, ValueError):
+        return None
+    return Path(found.origin) if found is not None and found.origin is not None else None
+
+
+def _words(command: str | None) -> list[str]:
+    try:
+        return shlex.split(command or "")
+    except ValueError:
+        return []

@@ -1,0 +1,230 @@
+"""Methods that are programs and are fed frame by frame: ``proto/method_stream.proto`` on their standard input and output."""
+
+from __future__ import annotations
+
+import os
+import select
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from google.protobuf.message import DecodeError
+
+from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.types import Observation, Trajectory
+from hippodrome.eval.contest.process import POLL_S, Process, command_words, last_words, started
+from hippodrome.eval.contest.program import limits_of
+from hippodrome.eval.methods.protocol import Answer, Cost, Given, Localized, Mapped, MethodError
+from hippodrome.proto import method_stream_pb2 as pb
+from hippodrome.sim.method_spec import MethodSpec
+
+VERSION: Final = 1
+MAX_MESSAGE_BYTES: Final = 64 << 20  # of a method's answer: the trajectory of a drive of a day
+CHUNK_BYTES: Final = 1 << 16
+LOOK_S: Final = 1.0  # between two looks at what memory a process that answers holds
+
+
+class StreamMapper:
+    """A program that makes a trajectory of the observations that it is fed."""
+
+    def __init__(self, spec: MethodSpec) -> None:
+        assert spec.stream is not None
+        self._spec, self._command = spec, spec.stream
+
+    def map(self, observations: Iterator[Observation], given: Given) -> Mapped:
+        """Its trajectory of the mapping drive. Raises MethodError with the cause if there is none."""
+        times_s, answers, finished, cost = self._run(self._command, pb.Begin.MAP, observations, given)
+        if finished.trajectory:
+            t_s = np.array([one.t_s for one in finished.trajectory])
+            poses = np.array([_pose(one.pose) for one in finished.trajectory])
+            return Mapped(Trajectory(t_s, poses), cost=cost)
+        known = [(t_s, *_pose(answer.pose)) for t_s, answer in zip(times_s, answers, strict=True) if answer.known]
+        if not known:
+            raise MethodError("none of its answers has a pose, and its last message has no trajectory")
+        table = np.array(known)
+        return Mapped(Trajectory(table[:, 0], table[:, 1:]), cost=cost)
+
+    def _run(
+        self, command: str, phase: pb.Begin.Phase, observations: Iterator[Observation], given: Given
+    ) -> tuple[list[float], list[pb.Answer], pb.Finished, Cost]:
+        """One drive, from Begin to Finished: times, answers, the last message, and what it cost."""
+        folder = given.folder / "kept"
+        folder.mkdir(exist_ok=True)
+        times_s, answers, steps_s = [], [], []
+        with started(command_words(command), given.folder, limits_of(self._spec), given.concealed, fed=True) as process:
+            line = _Line(process)
+            ready = line.asked(pb.ToMethod(begin=_begin(phase, given, folder)), "ready").ready
+            if ready.version != VERSION:
+                raise MethodError(f"it speaks version {ready.version} of the stream, this harness version {VERSION}")
+            for observation in observations:
+                message = pb.ToMethod(observation=_observation(observation))
+                began = time.perf_counter()
+                answers.append(line.asked(message, "answer").answer)
+                steps_s.append(time.perf_counter() - began)
+                times_s.append(observation.t_s)
+            finished = line.asked(pb.ToMethod(end=pb.End()), "finished").finished
+            process.look()
+            line.close()
+            process.wait()
+        return times_s, answers, finished, Cost(process.cpu_s, process.peak_rss_bytes, np.array(steps_s))
+
+
+class StreamLocalizer(StreamMapper):
+    """A program that can find a second drive in what it kept of the first one."""
+
+    def localize(self, observations: Iterator[Observation], given: Given) -> Localized:
+        """Its answers to the observations of the second drive."""
+        assert self._spec.localize is not None
+        times_s, answers, _, cost = self._run(self._spec.localize, pb.Begin.LOCALIZE, observations, given)
+        return Localized([_answer(t_s, answer) for t_s, answer in zip(times_s, answers, strict=True)], cost)
+
+
+class _Line:
+    """Messages to and from a process, with its limit of time."""
+
+    def __init__(self, process: Process) -> None:
+        assert process.popen.stdin is not None
+        assert process.popen.stdout is not None
+        self._process = process
+        self._to, self._from = process.popen.stdin.fileno(), process.popen.stdout.fileno()
+        self._held = bytearray()
+        self._looked_s = time.monotonic()
+        os.set_blocking(self._to, False)
+        os.set_blocking(self._from, False)
+
+    def asked(self, message: pb.ToMethod, expected: str) -> pb.FromMethod:
+        """The answer to a message. Raises MethodError if there is none, or it is another one than ``expected``."""
+        data = message.SerializeToString()
+        self._send(_varint(len(data)) + data)
+        while (body := self._message()) is None:
+            self._receive()
+        try:
+            answer = pb.FromMethod.FromString(body)
+        except DecodeError:
+            raise MethodError(f"it sent {len(body)} bytes that are no message of proto/method_stream.proto") from None
+        if (kind := answer.WhichOneof("message")) != expected:
+            raise MethodError(f"it answered with '{kind}' where '{expected}' was expected; see proto/method_stream.proto")
+        return answer
+
+    def close(self) -> None:
+        """Nothing more is sent."""
+        assert self._process.popen.stdin is not None
+        self._process.popen.stdin.close()
+
+    def _send(self, data: bytes) -> None:
+        view = memoryview(data)
+        while view:
+            try:
+                view = view[os.write(self._to, view) :]
+            except BlockingIOError:
+                self._wait(writing=True)
+            except BrokenPipeError:
+                self._gone()
+
+    def _receive(self) -> None:
+        try:
+            data = os.read(self._from, CHUNK_BYTES)
+        except BlockingIOError:
+            self._wait(writing=False)
+            return
+        if not data:
+            self._gone()
+        self._held += data
+
+    def _wait(self, writing: bool) -> None:
+        """Until the process takes or gives something; what it says too early is kept, so that neither waits for the other."""
+        readable, _, _ = select.select([self._from], [self._to] if writing else [], [], POLL_S)
+        if readable and writing:
+            data = os.read(self._from, CHUNK_BYTES)
+            if not data:
+                self._gone()
+            self._held += data
+        if len(self._held) > MAX_MESSAGE_BYTES:
+            raise MethodError(f"it sent more than {MAX_MESSAGE_BYTES >> 20} MiB without being asked")
+        now_s = time.monotonic()
+        if now_s - self._looked_s > LOOK_S or self._process.left_s <= 0.0:
+            self._looked_s = now_s
+            self._process.poll()
+            if (cause := self._process.failure()) is not None:
+                raise MethodError(cause)
+
+    def _message(self) -> bytes | None:
+        """The next whole message that has arrived."""
+        length = shift = place = 0
+        while True:
+            if place == len(self._held):
+                return None
+            byte = self._held[place]
+            length |= (byte & 0x7F) << shift
+            place, shift = place + 1, shift + 7
+            if byte < 0x80:
+                break
+            if shift > 28:
+                raise MethodError("it sent what is no length of a message: are its messages preceded by theirs, as a varint?")
+        if length > MAX_MESSAGE_BYTES:
+            raise MethodError(f"it sent a message of {length} bytes, the limit is {MAX_MESSAGE_BYTES}")
+        if len(self._held) < place + length:
+            return None
+        body = bytes(self._held[place : place + length])
+        del self._held[: place + length]
+        return body
+
+    def _gone(self) -> None:
+        """The process has closed a pipe. Raises MethodError that says how it ended."""
+        end_s = time.monotonic() + 2.0
+        while not self._process.poll() and time.monotonic() < end_s:
+            time.sleep(POLL_S / 10.0)
+        cause = self._process.failure()
+        raise MethodError(cause or f"it ended before the drive did; its last words: {last_words(self._process.log)}")
+
+
+def _varint(value: int) -> bytes:
+    found = bytearray()
+    while value > 0x7F:
+        found.append(value & 0x7F | 0x80)
+        value >>= 7
+    found.append(value)
+    return bytes(found)
+
+
+def _begin(phase: pb.Begin.Phase, given: Given, folder: Path) -> pb.Begin:
+    camera = pb.Camera(
+        width=given.camera.width,
+        height=given.camera.height,
+        focal_px=given.camera.focal_px(),
+        rate_hz=given.camera.rate_hz,
+        ahead_of_rear_axle_m=given.camera.forward_m,
+        height_m=given.camera.height_m,
+    )
+    message = pb.Begin(version=VERSION, phase=phase, camera=camera, rate_hz=given.rate_hz, seed=given.seed, folder=str(folder))
+    if given.start is not None:
+        message.start.CopyFrom(pb.Pose(x=given.start.x_m, y=given.start.y_m, heading_rad=given.start.heading_rad))
+    if given.roads is not None:
+        message.lanes.extend(_lanes(given.roads))
+    return message
+
+
+def _lanes(roads: RoadNetwork) -> Iterator[pb.Lane]:
+    for lane in range(roads.lane_count):
+        points_m = roads.lane_points_m(lane)
+        yield pb.Lane(x_m=points_m[:, 0].tolist(), y_m=points_m[:, 1].tolist())
+
+
+def _observation(one: Observation) -> pb.Observation:
+    message = pb.Observation(t_s=one.t_s, dt_s=one.dt_s, speed=one.speed, yaw_rate_radps=one.yaw_rate_radps)
+    if one.frame is not None:
+        message.height, message.width = one.frame.shape[:2]
+        message.channels = 1 if one.frame.ndim == 2 else 3
+        message.pixels = one.frame.tobytes()
+    return message
+
+
+def _pose(pose: pb.Pose) -> tuple[float, float, float]:
+    return pose.x, pose.y, pose.heading_rad
+
+
+def _answer(t_s: float, answer: pb.Answer) -> Answer:
+    covariance = np.array(answer.covariance).reshape(3, 3) if len(answer.covariance) == 9 else None
+    return Answer(t_s, *_pose(answer.pose), localized=answer.known, covariance=covariance)

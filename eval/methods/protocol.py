@@ -1,0 +1,184 @@
+"""What a method is: what it declares, what it is given, what it answers. Everything that has a row is one, ours as well.
+
+A method is an object with any of three functions; ``docs/methods.md`` shows each:
+
+* ``map(observations, given)`` makes a trajectory of a drive, and with it a map, if it keeps one.
+* ``localize(observations, given)`` finds a second drive in that map, from an unknown start, one answer per observation.
+* ``describe(frame)`` makes a vector of a frame, for place recognition alone.
+
+It receives observations and what it says that it needs. It is never given the truth: no argument has a place for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
+
+from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.types import (
+    CognitiveMap,
+    FloatArray,
+    Frame,
+    HippodromeError,
+    LocalizationEstimate,
+    Observation,
+    StartPose,
+    Trajectory,
+)
+from hippodrome.sim.render.camera import CameraSpec
+
+TimedPose: TypeAlias = tuple[float, float, float, float]  # t_s, x, y, heading_rad
+
+
+class MethodError(HippodromeError):
+    """A method that cannot be found, cannot be made, or answers with something that is no answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What a method is given beyond the speeds and yaw rates that every method has. The report prints it."""
+
+    camera: bool = True  # frames; without them, the observations have none, and none is decoded
+    road_network: bool = False
+    start_pose: bool = False  # where the mapping drive began, in the network's frame
+
+    def in_words(self) -> str:
+        """What the report says: ``self-motion, frames of one camera, the road network``."""
+        parts = ["self-motion"]
+        parts += ["frames of one camera"] if self.camera else []
+        parts += ["the road network"] if self.road_network else []
+        parts += ["the start pose"] if self.start_pose else []
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cost:
+    """What a process of its own took, where that is not what our process spent on it."""
+
+    cpu_s: float  # user and system time of all its processes
+    peak_rss_bytes: int | None = None  # the most memory that one of its processes held
+    step_s: FloatArray | None = None  # (N,) per observation, in s; None if it is not handed them one by one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Localized:
+    """All answers of ``localize`` at once, for a method that has its costs measured elsewhere."""
+
+    answers: Sequence[Answer | LocalizationEstimate]
+    cost: Cost
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mapped:
+    """What ``map`` made: a trajectory, and whatever else the method keeps of the drive."""
+
+    trajectory: Trajectory  # in the frame that the method declares
+    cognitive_map: CognitiveMap | None = None  # if its map is one of ours: it is saved, and its closures and lanes are scored
+    state: Any = None  # anything that its ``localize`` wants to have back as ``given.mapped.state``
+    figures: dict[str, Any] = field(default_factory=dict)  # further fields of its row
+    save: Callable[[Path], int] | None = None  # writes its map file and answers with the size in bytes
+    cost: Cost | None = None  # if it was measured elsewhere
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Given:
+    """What a method may know besides the observations. What it does not declare in its ``Needs`` is None."""
+
+    camera: CameraSpec
+    rate_hz: float  # of the observations
+    duration_s: float  # of the drive
+    seed: int  # for methods that draw numbers: the same seed is to give the same answer
+    folder: Path  # an empty folder of its own, for whatever it wants to write
+    roads: RoadNetwork | None = None
+    start: StartPose | None = None
+    base: Mapped | None = None  # the map of the method that it builds on, if it names one in ``builds_on``
+    mapped: Mapped | None = None  # for ``localize``: what its own ``map`` returned, or else its ``base``
+    concealed: tuple[Path, ...] = ()  # folders with the truth, which a program of its own is not to see
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Where a localizer believes the vehicle to be after one observation, in the network's frame."""
+
+    t_s: float
+    x_m: float
+    y_m: float
+    heading_rad: float
+    localized: bool = True  # whether it stands by this pose
+    covariance: FloatArray | None = None  # (3, 3) m, m, rad, if it knows one
+
+
+Mapping: TypeAlias = Mapped | Trajectory | Iterable[TimedPose]
+Localizing: TypeAlias = Iterable[Answer | LocalizationEstimate] | Localized
+
+
+@runtime_checkable
+class Maps(Protocol):
+    """A method that makes a trajectory of a drive; it may also yield ``(t_s, x, y, heading_rad)`` one by one."""
+
+    def map(self, observations: Iterator[Observation], given: Given) -> Mapping: ...
+
+
+@runtime_checkable
+class Localizes(Protocol):
+    """A method that finds a second drive in a map."""
+
+    def localize(self, observations: Iterator[Observation], given: Given) -> Localizing: ...
+
+
+@runtime_checkable
+class Describes(Protocol):
+    """A method that makes a vector (D,) of a frame; near vectors mean the same place."""
+
+    def describe(self, frame: Frame) -> FloatArray: ...
+
+
+def as_mapped(answer: Mapping, label: str) -> Mapped:
+    """What ``map`` returned, as one kind of object. Raises MethodError if it is nothing of the kind."""
+    if isinstance(answer, Mapped):
+        return answer
+    if isinstance(answer, Trajectory):
+        return Mapped(answer)
+    if not isinstance(answer, Iterable):
+        raise MethodError(
+            f"{label}: map() gave a {type(answer).__name__}; return a Trajectory, or yield (t_s, x, y, heading_rad) one by one"
+        )
+    poses = list(answer)  # a method that yields its poses does its work here, and what it raises is its own
+    try:
+        table = np.array([tuple(map(float, pose)) for pose in poses], dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise MethodError(
+            f"{label}: map() gave no trajectory ({error}); return a Trajectory, or yield (t_s, x, y, heading_rad) one by one"
+        ) from None
+    if table.ndim != 2 or table.shape[1] != 4:
+        raise MethodError(f"{label}: map() gave no poses; return a Trajectory, or yield (t_s, x, y, heading_rad) one by one")
+    return Mapped(Trajectory(table[:, 0], table[:, 1:]))
+
+
+def as_estimate(answer: Answer | LocalizationEstimate, label: str) -> LocalizationEstimate:
+    """An answer of ``localize`` as one kind of object. Raises MethodError if it is none, or has no finite pose."""
+    if isinstance(answer, LocalizationEstimate):
+        return answer
+    if not isinstance(answer, Answer):
+        raise MethodError(f"{label}: localize() gave a {type(answer).__name__}; yield one Answer per observation")
+    pose = np.array([answer.x_m, answer.y_m, answer.heading_rad], dtype=np.float64)
+    if answer.localized and not np.isfinite(pose).all():
+        raise MethodError(f"{label}: localize() stands by a pose that is not finite, at t_s={answer.t_s}")
+    covariance = np.zeros((3, 3)) if answer.covariance is None else np.asarray(answer.covariance, dtype=np.float64)
+    nothing = np.zeros((0, 2, 2))
+    return LocalizationEstimate(
+        t_s=answer.t_s,
+        pose=np.nan_to_num(pose),
+        covariance=covariance,
+        localized=answer.localized,
+        confidence=0.0,
+        view_cell=-1,
+        head_direction_rad=np.zeros(2),
+        head_reliability=np.zeros(2),
+        grid_phase_rad=nothing,
+        grid_reliability=nothing,
+    )

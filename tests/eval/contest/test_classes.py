@@ -1,0 +1,201 @@
+"""A Python class takes part: what it declares, what it is given, and a row with the cause for whatever it does."""
+
+import textwrap
+
+import numpy as np
+import pytest
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.eval.contest.entry import BUILT_IN, entries_of, load_class, parse_method, with_methods
+from hippodrome.eval.contest.perform import perform
+from hippodrome.sim.scenario import Scenario
+
+MODULE = """\
+import math
+import numpy as np
+from pydantic import BaseModel
+from hippodrome.eval.methods.protocol import Answer, Needs
+
+class Mapper:
+    def map(self, observations, given):
+        x = y = heading = 0.0
+        for one in observations:
+            heading += one.yaw_rate_radps * one.dt_s
+            x += one.speed * one.dt_s * math.cos(heading)
+            y += one.speed * one.dt_s * math.sin(heading)
+            yield one.t_s, x, y, heading
+
+class Configured(Mapper):
+    class Config(BaseModel):
+        factor: float = 1.0
+    def __init__(self, config):
+        self.factor = config.factor
+
+class Asking(Mapper):
+    needs = Needs(camera=False, road_network=True, start_pose=True)
+    def map(self, observations, given):
+        assert given.roads == "the roads" and given.start.x_m < 1.0
+        observations = list(observations)
+        assert all(one.frame is None for one in observations)
+        return Mapper.map(self, observations, given)
+
+class Blind(Mapper):
+    def map(self, observations, given):
+        assert given.roads is None and given.start is None
+        return super().map(observations, given)
+
+class Localizer(Mapper):
+    frame = "network"
+    def localize(self, observations, given):
+        for one, pose in zip(observations, given.mapped.trajectory.poses):
+            yield Answer(one.t_s, *pose, localized=one.t_s > 5.0)
+
+class Silent(Mapper):
+    frame = "network"
+    def localize(self, observations, given):
+        return []
+
+class Crash:
+    def map(self, observations, given):
+        raise ValueError("wrong thing")
+
+class Leaves:
+    def map(self, observations, given):
+        raise SystemExit(3)
+
+class Nan:
+    def map(self, observations, given):
+        return ((one.t_s, math.nan, 0.0, 0.0) for one in observations)
+
+class Backwards:
+    def map(self, observations, given):
+        return [(-one.t_s, 0.0, 0.0, 0.0) for one in observations]
+
+class Nothing:
+    def map(self, observations, given):
+        return None
+
+class Words:
+    def map(self, observations, given):
+        return ["a", "b"]
+
+class Half(Mapper):
+    def map(self, observations, given):
+        return list(super().map(observations, given))[:350]
+
+class Little(Mapper):
+    def map(self, observations, given):
+        return list(super().map(observations, given))[:50]
+
+class Empty: ...
+"""
+
+
+@pytest.fixture(autouse=True)
+def module(tmp_path, monkeypatch):
+    (tmp_path / "entrants.py").write_text(textwrap.dedent(MODULE))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+def row_of(materials, name, scenario=None):
+    entry = entries_of(with_methods(scenario or materials.scenario, [parse_method(f"mine=entrants:{name}")]))[-1]
+    return perform(materials, [entry]).rows[0]
+
+
+def test_a_mapper_has_its_errors_under_every_alignment(materials):
+    row = row_of(materials, "Mapper")
+    assert (row.failure, row.method) == (None, "mine")
+    assert row.ape_sim2.mean_m <= row.ape_se2.mean_m <= row.ape.mean_m < 1.0
+    assert row.latency_ms.p99 >= row.latency_ms.median > 0.0
+
+
+def test_a_method_is_given_what_it_declares_and_nothing_else(materials):
+    assert row_of(materials, "Asking").failure is None
+    assert row_of(materials, "Blind").failure is None
+
+
+def test_a_localizer_answers_once_per_observation(materials):
+    found = row_of(materials, "Localizer").localization
+    assert found.success
+    assert found.initial_drive_s == pytest.approx(5.0, abs=0.2)
+    assert found.mean_nees is None  # it knows no covariance
+
+
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("Crash", "crashed: ValueError: wrong thing (entrants.py, line"),
+        ("Leaves", "it left the process with status 3"),
+        ("Nan", "not finite"),
+        ("Backwards", "does not increase"),
+        ("Nothing", "map() gave a NoneType"),
+        ("Words", "map() gave no trajectory"),
+        ("Little", "cover"),
+    ],
+)
+def test_whatever_it_does_wrong_is_in_its_row(materials, name, cause):
+    row = row_of(materials, name)
+    assert cause in row.failure
+    assert row.ape is None
+
+
+def test_a_method_that_maps_well_and_answers_nothing_keeps_its_errors(materials):
+    row = row_of(materials, "Silent")
+    assert "0 answers to 600 observations" in row.failure
+    assert row.ape is not None
+
+
+def test_half_a_drive_is_scored_and_said_to_be_half(materials):
+    row = row_of(materials, "Half")
+    assert row.failure is None
+    assert row.covered == pytest.approx(350 / 600, abs=0.02)
+
+
+def test_a_configuration_is_checked_by_the_method_s_own_model(materials):
+    def scenario(**config):
+        return Scenario(name="circle", methods={"set": {"class": "entrants:Configured", "config": config}})
+
+    assert entries_of(scenario(factor=2.0))[-1].runner.factor == 2.0
+    with pytest.raises(HippodromeError, match=r"method set: config\.factor: "):
+        entries_of(scenario(factor="many"))
+
+
+@pytest.mark.parametrize(
+    ("reference", "cause"),
+    [
+        ("nowhere:Mapper", "there is no module 'nowhere'"),
+        ("entrants:Mappr", "the module has no 'Mappr'"),
+        ("entrants:MODULE", "the module has no 'MODULE'"),
+        ("entrants:math", "is a module, not a class"),
+    ],
+)
+def test_a_class_that_is_not_there_is_named(reference, cause):
+    with pytest.raises(HippodromeError, match=cause):
+        load_class(reference)
+
+
+def test_a_class_without_any_of_the_functions_is_refused(materials):
+    with pytest.raises(HippodromeError, match="none of the functions map, localize and describe"):
+        entries_of(with_methods(materials.scenario, [parse_method("entrants:Empty")]))
+
+
+def test_two_methods_of_one_name_are_refused(materials):
+    twice = [parse_method("entrants:Mapper"), parse_method("entrants:Mapper")]
+    for added in (twice, [parse_method("topometric=entrants:Mapper")], [parse_method("ORB-SLAM3=entrants:Mapper")]):
+        with pytest.raises(HippodromeError, match="one of this name already"):
+            entries_of(with_methods(materials.scenario, added))
+
+
+@pytest.mark.parametrize("text", ["absent", "exec:./run.sh", "a:b:c", "=x", "mine=", "exec:"])
+def test_what_names_no_method_is_refused(text):
+    with pytest.raises(ValueError):
+        parse_method(text)
+
+
+def test_ours_are_methods_like_everybody_s():
+    entries = entries_of(Scenario(name="town"))
+    assert [entry.method for entry in entries] == [cls.card for cls in BUILT_IN]
+    assert all("map" in entry.does for entry in entries)
+    assert [entry.method.label for entry in entries if "localize" in entry.does] == ["topometric (paper)", "topometric"]
+    assert np.unique([entry.method.stem for entry in entries]).size == len(entries)

@@ -1,0 +1,120 @@
+"""A program that reads files: what it is given, what it may take, and a row with the cause for whatever it does."""
+
+import stat
+
+import pytest
+
+from hippodrome.eval.contest.entry import Added, entries_of, with_methods
+from hippodrome.eval.contest.perform import perform
+from hippodrome.eval.contest.process import can_conceal
+from hippodrome.sim.method_spec import MethodSpec
+
+INTEGRATE = """\
+import csv, math, sys
+sequence, out = sys.argv[1:3]
+x = y = heading = before = 0.0
+with open(out + "/trajectory.tum", "w") as trajectory:
+    for row in csv.reader(open(sequence + "/odometry.csv")):
+        if row[0].startswith("#"):
+            continue
+        t, speed, yaw_rate = map(float, row)
+        heading, dt, before = heading + yaw_rate * (t - before), t - before, t
+        x, y = x + speed * dt * math.cos(heading), y + speed * dt * math.sin(heading)
+        trajectory.write(f"{t!r} {x!r} {y!r} 0 0 0 {math.sin(heading / 2)!r} {math.cos(heading / 2)!r}\\n")
+"""
+
+
+@pytest.fixture
+def row(materials, tmp_path, monkeypatch):
+    """Runs a program, a script's text, and gives the row of it alone."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(text, command="./program {sequence} {out}", **settings):
+        (tmp_path / "program").write_text(text)
+        (tmp_path / "program").chmod(stat.S_IRWXU)
+        added = Added("mine", MethodSpec(command=command, **settings))
+        entry = entries_of(with_methods(materials.scenario, [added]))[-1]
+        return perform(materials, [entry]).rows[0]
+
+    return run
+
+
+def python(text):
+    return f"#!/usr/bin/env python3\n{text}"
+
+
+@pytest.mark.parametrize("layout", ["tum", "euroc", "kitti"])
+def test_a_program_has_a_row_with_errors_and_costs(row, layout):
+    found = row(python(INTEGRATE), input=layout)
+    assert found.failure is None
+    assert found.ape.mean_m < 1.0
+    assert found.cpu_percent > 0.0
+    assert found.peak_rss_bytes > 1_000_000
+    assert found.latency_ms is None
+    assert found.covered == 1.0
+
+
+def test_frames_lie_where_each_layout_has_them(row):
+    listing = "import pathlib, sys\nhere = pathlib.Path(sys.argv[1])\n"
+    listing += "sys.exit(' '.join(sorted(str(path.relative_to(here)) for path in here.rglob('*'))[:9]))"
+    assert "rgb/0.100000.png" in row(python(listing)).failure
+    assert "mav0/cam0/data/100000000.png" in row(python(listing), input="euroc").failure
+    assert "image_2/000000.png" in row(python(listing), input="kitti").failure
+
+
+@pytest.mark.parametrize(
+    ("text", "cause"),
+    [
+        ("#!/bin/sh\nsleep 1000\n", "hung: no end after 1 s"),
+        ("#!/bin/sh\nexit 0\n", "left no trajectory.tum in {out}, but nothing"),
+        ("#!/bin/sh\necho sorry >&2; exit 7\n", "exit status 7; its last words: sorry"),
+        ("#!/bin/sh\nkill -SEGV $$\n", "crashed: signal 11 (SIGSEGV)"),
+        ("#!/bin/sh\necho '1 nan 0 0 0 0 0 1' > $2/trajectory.tum\n", "not finite"),
+        ("#!/bin/sh\nprintf '2 0 0 0 0 0 0 1\\n1 0 0 0 0 0 0 1\\n' > $2/trajectory.tum\n", "does not increase"),
+        ("#!/bin/sh\necho hello > $2/trajectory.tum\n", "trajectory.tum: line 1: 1 columns"),
+        ("#!/bin/sh\n: > $2/trajectory.tum\n", "trajectory.tum: no poses"),
+        ("#!/bin/sh\nprintf '1 0 0 0 0 0 0 1\\n2 1 0 0 0 0 0 1\\n' > $2/trajectory.tum\n", "cover"),
+        ("#!/bin/sh\nhead -c 100000000 /dev/zero | tail | sleep 100 & exit 0\n", "left no trajectory.tum"),
+    ],
+)
+def test_whatever_it_does_wrong_is_in_its_row(row, text, cause):
+    found = row(text, time_limit_s=1.0)
+    assert cause in found.failure
+    assert "/tmp" not in found.failure
+    assert found.ape is None
+
+
+def test_a_program_that_eats_memory_is_stopped(row):
+    found = row(python("held = []\nwhile True:\n    held.append(bytearray(20_000_000))\n"), memory_limit_mb=300)
+    assert "MemoryError" in found.failure or "memory" in found.failure
+
+
+def test_several_processes_that_eat_memory_together_are_stopped(row):
+    text = "import os, time\nfor _ in range(4):\n    os.fork()\nheld = bytearray(30_000_000)\ntime.sleep(30)\n"
+    assert "more than its limit of 300 MB" in row(python(text), memory_limit_mb=300, time_limit_s=20).failure
+
+
+def test_a_program_that_is_not_there_is_named(row):
+    assert "there is no program './absent'" in row("", command="./absent {sequence} {out}").failure
+
+
+def test_a_file_that_is_no_program_is_a_row(row):
+    assert row("not a program\n").failure.startswith(("exit status 127", "'./program' cannot be started"))
+
+
+def test_no_truth_can_be_reached(row, tmp_path):
+    if not can_conceal():
+        pytest.skip("this system has no mount namespaces for users")
+    text = f"#!/bin/sh\ncat {tmp_path}/recordings/one/truth.txt; ls -A {tmp_path}/recordings; echo end; exit 1\n"
+    assert "its last words: end" in row(text).failure
+    spy = f'#!/bin/sh\nfound=$(cat {tmp_path}/recordings/one/truth.txt 2>/dev/null)\necho "found $found."; exit 1\n'
+    assert "found ." in row(spy).failure
+
+
+def test_a_second_drive_is_localized_in_what_the_program_left(row, materials):
+    text = python("import sys\nif len(sys.argv) > 3:\n    open(sys.argv[3] + '/trajectory.tum')\n" + INTEGRATE)
+    found = row(text, frame="network", localize="./program {sequence} {out} {map}")
+    assert found.failure is None
+    assert found.localization.success
+    assert found.localization.localized_share == 1.0
+    assert found.localization.false_fixes == 0

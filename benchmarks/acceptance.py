@@ -162,10 +162,10 @@ def print_table(found: list[Offer]) -> None:
     print(f"{'offered':9}" + "".join(f"{head:>15}" for head in heads))
     for (kind, keyframes), own in sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] or 10**6)):
         accepted, wrong, seconds = (np.array([getattr(one, name) for one in own]) for name in ("accepted", "wrong", "seconds"))
-        counts = (np.sum(accepted == 0.0), np.sum(wrong > 0.0))
+        refused, some_wrong = np.sum(accepted == 0.0), np.sum(wrong > 0.0)
         print(
-            f"{kind:9}{keyframes or 'whole':>15}{len(own):15}{accepted.mean():15.3f}{counts[0]:15}{wrong.mean():15.4f}{counts[1]:15}"
-            f"{seconds.mean():15.2f}"
+            f"{kind:9}{keyframes or 'whole':>15}{len(own):15}{accepted.mean():15.3f}"
+            f"{refused:15}{wrong.mean():15.4f}{some_wrong:15}{seconds.mean():15.2f}"
         )
 
 

@@ -32,6 +32,7 @@ class ConfidenceConfig:
     least_joined_nats: float = 3.0  # the same of a segment that dead reckoning joins to a certain one
     least_votes: int = 6  # loop closures that concern a segment, from which on they may vote it down
     least_agreeing: float = 0.34  # share of them that must agree with it: 5 of 6 are false once in 600 times if 20 % are
+    most_sigma_m: float = 3.0  # a vertex whose place is less certain is ambiguous: it may be 10 m off
     most_moved_m: float = 12.0  # a vertex that the refinement moves farther is ambiguous; a right search errs by up to 7 m
 
 
@@ -113,8 +114,25 @@ def reject_displaced(status: UInt8Array, route: Route, points_m: FloatArray, con
     return np.where(displaced & (status == MatchStatus.MATCHED), MatchStatus.AMBIGUOUS, status).astype(np.uint8)
 
 
+def reject_uncertain(status: UInt8Array, covariance: FloatArray, config: ConfidenceConfig) -> UInt8Array:
+    """Status (S,) of the visits, where matched visits whose place is too uncertain are made ambiguous.
+
+    The road may be known there, but not how far along it the vehicle was: before the first corner or after the last one.
+
+    Args:
+        status: (S,) MatchStatus of each visit.
+        covariance: (S, 2, 2) of their places, in square metres.
+        config: how uncertain a place may be.
+    """
+    uncertain = np.linalg.eigvalsh(covariance)[:, -1] > config.most_sigma_m**2
+    return np.where(uncertain & (status == MatchStatus.MATCHED), MatchStatus.AMBIGUOUS, status).astype(np.uint8)
+
+
 CAUSES = {
-    MatchStatus.AMBIGUOUS: "another route, or chance, explains the drive about as well; drive farther or give a start pose",
+    MatchStatus.AMBIGUOUS: (
+        "another route, or another place along this one, or chance, explains the drive about as well; "
+        "drive farther, round corners, or give a start pose"
+    ),
     MatchStatus.OFF_NETWORK: "no road of the network explains the drive here",
     MatchStatus.NO_ROUTE: "no route leads from the last matched place to the next",
 }

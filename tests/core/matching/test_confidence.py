@@ -9,6 +9,7 @@ from hippodrome.core.matching.confidence import (
     match_breaks,
     match_status,
     reject_displaced,
+    reject_uncertain,
 )
 from hippodrome.core.matching.control import control_of
 from hippodrome.core.matching.search.config import RouteSearchConfig
@@ -125,6 +126,13 @@ def test_another_town_and_the_mirrored_drive_are_not_matched():
             status = searched(other, town)[1]
             assert not np.any(status == MatchStatus.MATCHED)
             assert sum(b.last_vertex - b.first_vertex + 1 for b in match_breaks(status)) == len(status)
+
+
+def test_a_vertex_that_may_be_anywhere_along_its_road_is_ambiguous():
+    status = np.full(3, MatchStatus.MATCHED, dtype=np.uint8)
+    slanting = np.array([[5.0, 4.9], [4.9, 5.0]])  # 3.15 m along the diagonal
+    covariance = np.stack([np.diag([8.9, 1.0]), np.diag([1.0, 9.1]), slanting])
+    assert reject_uncertain(status, covariance, CONFIG).tolist() == [MatchStatus.MATCHED, *[MatchStatus.AMBIGUOUS] * 2]
 
 
 def test_a_vertex_that_the_refinement_drags_away_becomes_ambiguous():

@@ -50,7 +50,7 @@ KINDS = ("grid", "radial", "random", "rural")
 LENGTHS = (60, 100, 200, 400)  # keyframes, some 5 m apart; and the whole drive
 NOISE = ("paper", "realistic", "harsh")
 FAR_M = 20.0  # as far off as a false fix
-DRIVEN_M = 12.0  # a road is driven if most of it lies this close to the path
+DRIVEN_M = 12.0  # a road is gone if any point of it lies this close to the path
 CUT_NATS = 30.0  # evidence beyond this is not told apart
 
 
@@ -106,7 +106,7 @@ def without_driven(drive: DrivenRoads) -> RoadNetwork | None:
     """The network without the streets, in both directions, that were driven; None if nothing is left of it."""
     near = KDTree(_dense(drive.poses_m)).query(drive.network.points_m, distance_upper_bound=DRIVEN_M)[0] < DRIVEN_M
     share = np.add.reduceat(near.astype(float), drive.network.point_start[:-1]) / np.diff(drive.network.point_start)
-    driven = np.unique(drive.network.lane_edge[share > 0.5])
+    driven = np.unique(drive.network.lane_edge[share > 0.0])
     if np.all(drive.network.is_internal[~np.isin(drive.network.lane_edge, driven)]):
         return None
     return without_roads(drive.network, driven.tolist())

@@ -1,10 +1,13 @@
-"""The mirrored drive as a control: how well chance explains a drive in this very network.
+"""Decoys as a control: how well chance explains a drive in this very network.
 
-A drive whose turns are all reversed, left for right, was never driven. Whatever route explains it well does so by chance, and in
-the same network, at the same length and with as many turns as the drive itself: its cost is what chance achieves. A right route
-costs far less. A wrong one costs about as much as its mirror image, sometimes a little more, sometimes a little less. Controls of
-this kind are known as decoys where sequences are identified in a database (J. E. Elias, S. P. Gygi, "Target-decoy search
-strategy", 2007).
+A decoy is a drive that never was: the real one with every turn to the other side, or with its turns in reverse order. Whatever
+route explains a decoy well does so by chance, and in the same network, at the same length and with as many turns as the drive
+itself: its cost is what chance achieves. A right route costs far less. A wrong one costs about as much as a decoy, sometimes a
+little more, sometimes a little less. Decoys have this use where sequences are identified in a database (J. E. Elias, S. P. Gygi,
+"Target-decoy search strategy", 2007).
+
+Two decoys are used because each has a blind spot. Where traffic keeps right, U-turns and sharp turns are driven to one side only,
+so that a mirrored drive fits badly whatever the network. And a drive with few turns, reversed, may be much like itself.
 """
 
 from __future__ import annotations
@@ -17,13 +20,14 @@ from typing import TypeAlias
 import numpy as np
 
 from hippodrome.core.matching.search.config import RouteSearchConfig
+from hippodrome.core.matching.search.hypotheses import NOWHERE
 from hippodrome.core.matching.search.passes import best_nats
 from hippodrome.core.matching.search.problem import SearchProblem
 from hippodrome.core.matching.search.route import Route
 from hippodrome.core.matching.search.starts import anchor_samples, starts_without_prior
 from hippodrome.core.matching.search.track import Track
 
-Control: TypeAlias = Callable[[int, int, float], float]  # first and end sample, least log likelihood -> ``mirrored_nats``
+Control: TypeAlias = Callable[[int, int, float], float]  # first and end sample, least log likelihood -> ``decoy_nats``
 
 FACTOR = 2.0  # chance must cost at least this many times what the route costs: wrong ones cost 0.6 to 1.6 times as much
 _WINDOW = 120  # steps (600 m) around the most turning that are tried first: a right route has proved itself there nearly always
@@ -33,17 +37,22 @@ _LEAST_TURN_RAD = 0.7  # less turning than half a crossing fits everywhere, to t
 
 def control_of(problem: SearchProblem, config: RouteSearchConfig) -> Control:
     """The control for the parts of one drive."""
-    return partial(mirrored_nats, problem, config)
+    return partial(decoy_nats, problem, config)
 
 
-def mirrored_nats(problem: SearchProblem, config: RouteSearchConfig, first: int, end: int, least_nats: float) -> float:
-    """Log likelihood of the best route of the mirrored samples ``first`` to ``end - 1`` of the drive, from an unknown start.
+def decoy_nats(problem: SearchProblem, config: RouteSearchConfig, first: int, end: int, least_nats: float) -> float:
+    """Log likelihood of the best route of a decoy of the samples ``first`` to ``end - 1`` of the drive, from an unknown start.
 
-    It is -inf if it is below ``least_nats``; the search ends as soon as that is certain.
+    It is that of the better explained one of two decoys, or -inf if both are below ``least_nats``; the search ends as soon as
+    that is certain.
     """
-    mirrored = replace(problem, track=mirrored_part(problem.track, first, end))
-    start = starts_without_prior(mirrored, anchor_samples(mirrored.track, 1)[0], config, least_nats)
-    return best_nats(mirrored, start.initial, config, least_nats)
+    best = NOWHERE
+    for make_decoy in (mirrored_part, reversed_part):
+        decoy = replace(problem, track=make_decoy(problem.track, first, end))
+        floor = max(best, least_nats)
+        start = starts_without_prior(decoy, anchor_samples(decoy.track, 1)[0], config, floor)
+        best = max(best, best_nats(decoy, start.initial, config, floor))
+    return best
 
 
 def mirrored_part(track: Track, first: int, end: int) -> Track:
@@ -52,9 +61,15 @@ def mirrored_part(track: Track, first: int, end: int) -> Track:
     return Track(arc, heading[0] - heading, arc, track.step)
 
 
+def reversed_part(track: Track, first: int, end: int) -> Track:
+    """The samples ``first`` to ``end - 1`` of a track with its turns in reverse order, each to its own side."""
+    arc, heading = track.arc[first:end] - track.arc[first], track.heading_rad[first:end]
+    return Track(arc, heading[-1] - heading[::-1], arc, track.step)
+
+
 def evidence_nats(route: Route, first: int, end: int, control: Control, enough_nats: float) -> float:
     """Evidence that the samples ``first`` to ``end - 1`` of the route were driven: ``FACTOR`` times their log likelihood, less
-    that of the mirrored drive.
+    that of the decoys.
 
     It is cut off at ``enough_nats``. The turns around one place are tried first, and the whole part only if they leave it open.
     """

@@ -12,6 +12,7 @@ from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.types import Edges
 
 _JUMP = 0.3  # a jump of the log scale by this much is either a rare restart of the odometry or a wrong turning of the route
+_CHOICE_NATS = 4.0  # a segment's ends, and which misfits lie outside of it, are all chosen after the fact
 _SHORT_GAP = 8  # steps (40 m) off the network, over which dead reckoning errs by 10 m at most (``off_network``)
 _MOST_CONTROLS = 6  # segments, those that turn most, for which a control is searched: it bounds the time for a wrong network
 
@@ -43,8 +44,7 @@ def with_evidence(segments: list[RouteSegment], route: Route, control: Control, 
     """The segments with the evidence for each, which is cut off at ``enough_nats``.
 
     A segment is the best part of a route, chosen after the fact from all of the drive. The more of the drive there was to choose
-    from, the more evidence chance finds: ln(length of the drive / length of the segment) is taken off for the choice of its first
-    sample, and as much for that of its last.
+    from, the more evidence chance finds: ``_CHOICE_NATS`` times ln(length of the drive / length of the segment) is taken off.
     """
     turned = np.array([turned_rad(route.track, segment.first, segment.end) for segment in segments])
     tried = set(np.argsort(-turned, kind="stable")[:_MOST_CONTROLS].tolist())
@@ -56,12 +56,12 @@ def with_evidence(segments: list[RouteSegment], route: Route, control: Control, 
 
 def _chosen_evidence_nats(segment: RouteSegment, route: Route, control: Control, enough_nats: float) -> float:
     """The evidence for a segment, less what the choice of the segment accounts for."""
-    choice_nats = 2.0 * float(np.log(len(route.lane) / (segment.end - segment.first)))
+    choice_nats = _CHOICE_NATS * float(np.log(len(route.lane) / (segment.end - segment.first)))
     return evidence_nats(route, segment.first, segment.end, control, enough_nats + choice_nats) - choice_nats
 
 
 def significant_segments(
-    segments: list[RouteSegment], least_nats: float, least_joined_nats: float, start_known: bool
+    segments: list[RouteSegment], least_samples: int, least_nats: float, least_joined_nats: float, start_known: bool
 ) -> list[RouteSegment]:
     """The segments whose evidence is too high to be due to chance.
 
@@ -70,11 +70,14 @@ def significant_segments(
 
     Args:
         segments: all segments of one route, in driving order.
+        least_samples: a shorter segment is not certain by itself, whatever the evidence: chance fits a few corners anywhere.
         least_nats: evidence from which on a segment is certain by itself.
         least_joined_nats: evidence that suffices for a segment once another one is certain.
         start_known: whether a start pose was given; the segment at the drive's beginning is certain then.
     """
-    certain = [s.evidence_nats >= least_nats or (start_known and s.first == 0) for s in segments]
+    certain = [
+        (s.evidence_nats >= least_nats and s.end - s.first >= least_samples) or (start_known and s.first == 0) for s in segments
+    ]
     kept = [sure or (any(certain) and s.evidence_nats >= least_joined_nats) for s, sure in zip(segments, certain, strict=True)]
     for order in (range(1, len(segments)), range(len(segments) - 2, -1, -1)):
         for i in order:

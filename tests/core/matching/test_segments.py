@@ -50,7 +50,7 @@ def test_a_segment_is_judged_by_its_mirror_image_less_the_choice_of_it():
     assert found.evidence_nats == pytest.approx(30.0 - 2.0 * 3.9)  # the step that leads to the first sample does not count
     assert asked[0] == (0, 40, pytest.approx(-2.0 * 3.9 - 50.0))
     (found,) = with_evidence([half], drive, control, 50.0)
-    assert found.evidence_nats == pytest.approx(30.0 - 2.0 * 1.9 - 2.0 * np.log(2.0))
+    assert found.evidence_nats == pytest.approx(30.0 - 2.0 * 1.9 - 4.0 * np.log(2.0))
 
 
 def test_what_does_not_turn_is_no_evidence_and_is_not_searched():
@@ -62,8 +62,8 @@ def test_what_does_not_turn_is_no_evidence_and_is_not_searched():
 
 def test_short_gaps_carry_certainty_on_and_jumps_of_the_scale_do_not():
     found = [RouteSegment(0, 5), RouteSegment(9, 20), RouteSegment(20, 30), RouteSegment(60, 90, 40.0), RouteSegment(95, 99)]
-    assert significant_segments(found, 8.0, 3.0, start_known=False) == found[3:]  # 30 samples are too long a gap
-    assert significant_segments(found, 8.0, 3.0, start_known=True) == [*found[:2], *found[3:]]
+    assert significant_segments(found, 10, 8.0, 3.0, start_known=False) == found[3:]  # 30 samples are too long a gap
+    assert significant_segments(found, 10, 8.0, 3.0, start_known=True) == [*found[:2], *found[3:]]
 
 
 def test_a_jump_of_the_scale_begins_another_segment():
@@ -73,9 +73,15 @@ def test_a_jump_of_the_scale_begins_another_segment():
 
 def test_one_certain_segment_carries_the_others():
     found = [RouteSegment(0, 5, 3.0), RouteSegment(19, 30, 8.0), RouteSegment(50, 90, 40.0)]
-    assert significant_segments(found, 24.0, 6.0, start_known=False) == found[1:]
-    assert significant_segments(found[:2], 24.0, 6.0, start_known=False) == []
-    assert significant_segments(found[:2], 24.0, 6.0, start_known=True) == found[:2]
+    assert significant_segments(found, 10, 24.0, 6.0, start_known=False) == found[1:]
+    assert significant_segments(found[:2], 10, 24.0, 6.0, start_known=False) == []
+    assert significant_segments(found[:2], 10, 24.0, 6.0, start_known=True) == found[:2]
+
+
+def test_a_short_segment_is_never_certain_by_itself():
+    found = [RouteSegment(0, 5, 40.0), RouteSegment(20, 60, 2.0)]
+    assert significant_segments(found, 10, 8.0, 3.0, start_known=False) == []
+    assert significant_segments(found, 5, 8.0, 3.0, start_known=False) == found[:1]
 
 
 def test_loop_closures_vote_down_the_segment_that_is_elsewhere():

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hippodrome.core.matching.search.beam import backward
-from hippodrome.core.matching.search.config import RouteSearchConfig, SearchCosts
+from hippodrome.core.matching.search.coarse import good_states, hypotheses_in
+from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.hypotheses import HYPOTHESIS, NOWHERE, PLACE, Hypotheses
 from hippodrome.core.matching.search.passes import forward_pass, last_survivors
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, compiled_drive, compiled_model
@@ -25,11 +26,10 @@ from hippodrome.core.roads.lane_graph import (
     reversed_network,
 )
 from hippodrome.core.se2 import wrap
-from hippodrome.core.types import Float32Array, IntArray, StartPose
+from hippodrome.core.types import Float32Array, StartPose
 
 _HORIZON = 60  # steps (300 m) over which the turns after an anchor are counted: about what makes a start unique
 _MOST_TURN_RAD = 0.5  # most that the turn of one step counts, so that U-turns do not outweigh other turns
-_MOST_COARSE = 1_000_000  # hypotheses kept at each step of the coarse search: a large town in coarse bins
 _NO_PLACES = np.empty(0, PLACE)
 
 
@@ -64,11 +64,7 @@ def starts_without_prior(problem: SearchProblem, anchor: int, config: RouteSearc
     The coarse search rates all bins and scales at the anchor, a fine one those that it finds good; what both find good is traced
     back to the beginning of the drive. What scores less than ``least_nats`` over the turns after the anchor is dropped.
     """
-    nats, scales = _coarse_nats(problem, anchor, config, least_nats), len(problem.log_scale)
-    bins = np.flatnonzero(nats.max(axis=1) > NOWHERE).astype(np.int32)
-    hypotheses = _hypotheses_in(problem.graph, bins, scales, float(problem.track.heading_rad[anchor]))
-    hypotheses["score_nats"] = nats[bins].ravel()
-    hypotheses = hypotheses[hypotheses["score_nats"] > NOWHERE]
+    hypotheses = good_states(problem, anchor, config, least_nats)
     hypotheses, step_nats = _good_over_horizon(problem, anchor, hypotheses, config, least_nats)
     if anchor == 0 or len(hypotheses) == 0:
         return Start(InitialHypotheses(hypotheses, _NO_PLACES), step_nats)
@@ -80,7 +76,7 @@ def starts_near_pose(problem: SearchProblem, start: StartPose, config: RouteSear
     scales = len(problem.log_scale)
     prior = _prior_nats(problem.graph, start)
     near = np.flatnonzero(prior >= prior.max() - config.beam_nats).astype(np.int32)
-    on_network = _hypotheses_in(problem.graph, near, scales, float(problem.track.heading_rad[0]))
+    on_network = hypotheses_in(problem.graph, near, scales, float(problem.track.heading_rad[0]))
     on_network["score_nats"] = np.repeat(prior[near], scales)
     off, places = np.zeros(scales, HYPOTHESIS), np.zeros(scales, PLACE)
     off["bin"], off["scale_bin"] = -1 - np.arange(scales), np.arange(scales)
@@ -91,82 +87,11 @@ def starts_near_pose(problem: SearchProblem, start: StartPose, config: RouteSear
     return InitialHypotheses(np.concatenate([on_network, off]), places)
 
 
-def _hypotheses_in(graph: LaneGraph, bins: IntArray, scales: int, heading_rad: float) -> Hypotheses:
-    """Hypotheses for every scale bin in each of the bins, bin by bin.
-
-    Each is headed along its lane while odometry says ``heading_rad``; the difference is its heading offset.
-    """
-    rows = np.zeros(len(bins) * scales, HYPOTHESIS)
-    rows["bin"] = np.repeat(bins, scales)
-    rows["scale_bin"] = np.tile(np.arange(scales, dtype=np.int32), len(bins))
-    rows["heading_offset_rad"] = np.repeat(wrap(graph.heading_rad[bins].astype(np.float64) - heading_rad), scales)
-    return rows
-
-
 def _prior_nats(graph: LaneGraph, start: StartPose) -> Float32Array:
     """Log prior (N,) of beginning in each bin, up to a constant: normal in the place and in the heading."""
     away = np.hypot(graph.points_m[:, 0] - start.x_m, graph.points_m[:, 1] - start.y_m) / start.sigma_m
     turned = wrap(graph.heading_rad.astype(np.float64) - start.heading_rad) / start.sigma_rad
     return (-0.5 * (away**2 + turned**2)).astype(np.float32)
-
-
-def _coarse_nats(problem: SearchProblem, anchor: int, config: RouteSearchConfig, least_nats: float) -> Float32Array:
-    """Rate each fine bin and scale bin (N, K) as the state at the anchor, by a coarse search over the samples after it.
-
-    The rating is the score of the best route that begins in the state, less that of the best of all; it is ``NOWHERE`` for states
-    more than ``seed_margin_nats`` behind, and for all of them if no route scores ``least_nats``. All fine states within one
-    coarse state get the same rating.
-    """
-    coarse = _coarse_problem(problem, config)
-    # the steps of the coarse search are twice as long, so that it takes every second sample
-    drive, model = compiled_drive(coarse, problem.track.heading_rad[anchor::2]), compiled_model(coarse)
-    bin_count, scales = coarse.graph.bin_count, len(coarse.log_scale)
-    everywhere = np.arange(bin_count, dtype=np.int32)
-    starts = _hypotheses_in(coarse.graph, everywhere, scales, float(problem.track.heading_rad[anchor]))
-    initial = InitialHypotheses(starts, _NO_PLACES)
-    survivors = forward_pass(drive, model, initial, config.coarse_beam_nats, _MOST_COARSE, config.coarse_enough, least_nats)
-    if survivors.died_out and least_nats > NOWHERE:
-        return np.full((problem.graph.bin_count, len(problem.log_scale)), NOWHERE, np.float32)
-    nothing_beyond = np.zeros(survivors.row_start[-1] - survivors.row_start[-2], np.float32)
-    through = backward(drive, model, config.seed_margin_nats, survivors, nothing_beyond)[: len(starts)]
-    coarse_bin = coarse.graph.lane_start[problem.graph.lane] + _coarse_bin_of_lane(problem.graph, coarse.graph)
-    coarse_scale = np.minimum(np.arange(len(problem.log_scale)) // config.coarse, scales - 1)
-    nats: Float32Array = through.reshape(bin_count, scales)[coarse_bin][:, coarse_scale]
-    return nats
-
-
-def _coarse_problem(problem: SearchProblem, config: RouteSearchConfig) -> SearchProblem:
-    """The same problem with bins and scale bins ``config.coarse`` times as large and steps twice as long.
-
-    It has so few states that all of them can be searched at once.
-    """
-    factor = config.coarse
-    log_scale = problem.log_scale[factor // 2 :: factor]  # the middle of each group of scale bins
-    step = 2.0 * problem.track.step  # coarse bins need longer steps, to be moved by more than a bin
-    reach_m = step * float(np.exp(log_scale[-1])) + 4.0 * factor * config.bin_m
-    return replace(
-        problem,
-        track=replace(problem.track, step=step),
-        log_scale=log_scale,
-        graph=build_lane_graph(problem.network, reach_m, factor * config.bin_m),
-        costs=_coarse_costs(config),
-        off_network=replace(config.off_network, leave_nats=1e9),  # the start is sought on the network only
-        bin_m=factor * config.bin_m,
-    )
-
-
-def _coarse_costs(config: RouteSearchConfig) -> SearchCosts:
-    """Costs of the coarse search: looser, because its bins and scales fit badly and the true start must not be lost."""
-    return replace(
-        config.costs, heading_sigma_rad=0.2, heading_limit_nats=5.0, offset_gain=0.1, length_sigma_m=1.5, scale_step_nats=2.0
-    )
-
-
-def _coarse_bin_of_lane(fine: LaneGraph, coarse: LaneGraph) -> IntArray:
-    """The coarse bin (N,) in which each fine bin lies, counted from the beginning of its lane."""
-    counts = np.diff(fine.lane_start)[fine.lane]
-    order = np.arange(fine.bin_count) - fine.lane_start[fine.lane]
-    return ((order + 0.5) / counts * np.diff(coarse.lane_start)[fine.lane]).astype(np.int32)
 
 
 def _good_over_horizon(

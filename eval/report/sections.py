@@ -13,6 +13,7 @@ from hippodrome.eval.report.commands import command_lines
 from hippodrome.eval.report.evidence import MapEvidence
 from hippodrome.eval.report.files import Picture, ScenarioFiles
 from hippodrome.eval.report.markup import Child, Html, data_script, element, joined
+from hippodrome.eval.report.player import player
 from hippodrome.eval.report.tables import (
     anchor,
     break_table,
@@ -44,6 +45,7 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
     return element(
         "section",
         element("h2", scenario.name, " ", _verdict(scenario)),
+        player(files),
         element("p", scenario_title(scenario), class_="note"),
         _failures(scenario),
         _headline(scenario),
@@ -63,6 +65,8 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         element("h3", "Run it again"),
         _commands(scenario, files.evidence),
         _folded("Effective configuration", _configuration(scenario)),
+        class_="panel",
+        data_town=scenario.name,
         id=anchor(place),
         style=_frames_style(files),
     )
@@ -214,4 +218,5 @@ def _frames_style(files: ScenarioFiles) -> str | None:
         return None
     sheet = files.evidence.thumbnails
     rows = -(-len(sheet.t_s) // sheet.columns)
-    return f"--sheet:url({files.thumbnails});--columns:{sheet.columns};--rows:{rows};--ratio:{sheet.width}/{sheet.height}"
+    second = f"--sheet2:url({files.second_frames});" if files.second_frames else ""
+    return f"{second}--sheet:url({files.thumbnails});--columns:{sheet.columns};--rows:{rows};--ratio:{sheet.width}/{sheet.height}"

@@ -129,7 +129,7 @@ def test_is_one_file_that_asks_the_network_for_nothing(page):
 
 def test_links_lead_somewhere_and_ids_are_unique(page):
     ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
-    assert len(ids) == len(set(ids)) == 2
+    assert len(ids) == len(set(ids)) == 3
     assert {attributes["href"].removeprefix("#") for attributes in page.all("a")} == set(ids)
 
 

@@ -26,6 +26,7 @@ SCRIPTS: Final = (
     "brain.js",
     "player.js",
     "compare.js",
+    "tables.js",
     "tabs.js",
 )  # each uses those before it
 # The page asks no server for anything: pictures, style and script are in the file itself.

@@ -56,7 +56,9 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         _titled("Ten sequences from unknown starts (Table II)", comparison.sequences(files.sequences)),
         _titled("Cheaper than ORB-SLAM3", comparison.ratios(files.ratios)),
         _titled("What each method is given", comparison.fairness(scenario)),
-        _folded("What each figure means", element("ul", [element("li", line) for line in definitions(rows)])),
+        _folded(
+            "What each figure means", element("ul", [element("li", line) for line in definitions(rows)], class_="definitions")
+        ),
         _titled("Map", _interactive_map(files) if files.evidence else None),
         _titled("Worst places", worst_places(files.evidence, files.thumbnails is not None) if files.evidence else None),
         _titled("Breaks", break_table(scenario)),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
+from typing import Final
 
 from hippodrome.eval.methods.method import method_of
 from hippodrome.eval.report.evidence import Layer, MapEvidence
@@ -19,6 +21,11 @@ from hippodrome.eval.results.tables import (
     row_cells,
 )
 
+FIRST: Final = ("APE (m)", "Success", "Error (m)")  # columns beside the method's name, so that a phone shows them unscrolled
+SPLIT: Final = {  # headings of cells that hold several figures, and those of one column for each figure
+    "APE median / p95 / max": ("APE median (m)", "APE p95 (m)", "APE max (m)"),
+    "Latency (ms)": ("Latency median (ms)", "Latency p99 (ms)"),
+}
 FRAME_LABEL = "camera frame at {:.0f} s"
 
 
@@ -129,10 +136,22 @@ def break_table(scenario: ScenarioResult) -> Html | None:
 
 
 def _row_table(columns: Sequence[Column], rows: Sequence[Row], label: str) -> Html:
-    columns = filled_columns(columns, rows)
+    filled = sorted(filled_columns(columns, rows)[1:], key=lambda column: column.title not in FIRST)
+    columns = [columns[0], *(part for column in filled for part in _parts(column))]
     head = element("tr", [element("th", column.title, scope="col") for column in columns])
     body = [_row_line(row_cells(columns, row), row) for row in rows]
     return scrolling(element("table", element("thead", head), element("tbody", body)), label)
+
+
+def _parts(column: Column) -> list[Column]:
+    """One column for each figure of a cell, which the cell separates by slashes; a column of single figures is itself."""
+    titles = SPLIT.get(column.title, ())
+    return [Column(title, partial(_part, column, place)) for place, title in enumerate(titles)] or [column]
+
+
+def _part(column: Column, place: int, row: Row) -> str:
+    parts = column.cell(row).split(" / ")
+    return parts[place] if place < len(parts) else NONE
 
 
 def _row_line(cells: Sequence[str], row: Row) -> Html:

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 from hippodrome.eval.methods.method import REFINED
 from hippodrome.eval.report.belief import BELIEF_JSON, SECOND_FRAMES, SecondDrive, read_second_drive
 from hippodrome.eval.report.evidence import MAP_JSON, THUMBNAILS, MapEvidence, read_map_evidence
+from hippodrome.eval.report.why import WHY_JSON, Places, read_why
 from hippodrome.eval.results.model import ResultsError
 from hippodrome.eval.results.ratios import RATIOS
 from hippodrome.eval.results.table_two import TABLE_TWO, SequenceRow
@@ -58,6 +59,7 @@ class ScenarioFiles:
     ratios: Mapping[str, Any] = field(default_factory=dict)  # content of ratios.json
     second: SecondDrive | None = None  # what the localizer believed on the second drive
     second_frames: str | None = None  # data URI of that drive's sheet
+    why: Places | None = None  # what is known about the worst places of the first drive
 
 
 def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
@@ -79,6 +81,7 @@ def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
         _parsed(folder / RATIOS, dict[str, Any]) or {},
         read_second_drive(second) if second.exists() else None,
         data_uri("image/jpeg", second_frames.read_bytes()) if second_frames.exists() else None,
+        read_why(folder / WHY_JSON) if (folder / WHY_JSON).exists() else None,
     )
 
 

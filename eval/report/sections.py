@@ -13,6 +13,7 @@ from hippodrome.eval.report.commands import command_lines
 from hippodrome.eval.report.evidence import MapEvidence
 from hippodrome.eval.report.files import Picture, ScenarioFiles
 from hippodrome.eval.report.markup import Child, Html, data_script, element, joined
+from hippodrome.eval.report.places import localization_places, mapping_places
 from hippodrome.eval.report.player import player
 from hippodrome.eval.report.tables import (
     anchor,
@@ -21,7 +22,6 @@ from hippodrome.eval.report.tables import (
     mapping_table,
     plain_table,
     scrolling,
-    worst_places,
 )
 from hippodrome.eval.results.aligned import aligned_note
 from hippodrome.eval.results.model import Row, ScenarioResult
@@ -56,11 +56,10 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         _titled("Ten sequences from unknown starts (Table II)", comparison.sequences(files.sequences)),
         _titled("Cheaper than ORB-SLAM3", comparison.ratios(files.ratios)),
         _titled("What each method is given", comparison.fairness(scenario)),
-        _folded(
-            "What each figure means", element("ul", [element("li", line) for line in definitions(rows)], class_="definitions")
-        ),
+        _folded("What each figure means", _definitions(rows)),
         _titled("Map", _interactive_map(files) if files.evidence else None),
-        _titled("Worst places", worst_places(files.evidence, files.thumbnails is not None) if files.evidence else None),
+        _titled("Why is it wrong here? The worst places", mapping_places(files, scenario.name)),
+        localization_places(files, scenario.name),
         _titled("Breaks", break_table(scenario)),
         _titled("Figures", _gallery(files.pictures) if files.pictures else None),
         _titled("Stage times", _timings(scenario)),
@@ -72,6 +71,10 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         id=anchor(place),
         style=_frames_style(files),
     )
+
+
+def _definitions(rows: Sequence[Row]) -> Html:
+    return element("ul", [element("li", line) for line in definitions(rows)], class_="definitions")
 
 
 def _titled(title: str, content: Html | None) -> Html | None:

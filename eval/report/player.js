@@ -38,7 +38,8 @@ function startPlayer(root) {
   const scene = makeScene(find(".scene"), story), chart = makeChart(find(".chart canvas"), story), slider = find(".chart");
   const films = [["--sheet", data.thumbnails], ["--sheet2", story.second && story.second.frames]]
     .map(([key, tiles]) => tiles && style.getPropertyValue(key) ? makeFilm(style.getPropertyValue(key), tiles) : null);
-  const brain = find(".brain") ? makeBrain(find(".brain")) : null;
+  const brain = find(".brain") ? makeBrain(find(".brain")) : null, strip = section.querySelector(".traces canvas");
+  const traces = strip ? makeTraces(strip) : null;
   let name = story.choices.at(-1) || null, segments = [], s = 0, playing = false, last = null, waiting = false;
 
   const length = () => (segments.length ? segments.at(-1).s1 : 1);
@@ -73,6 +74,8 @@ function startPlayer(root) {
     const moment = momentAt(segments, s);
     scene.draw(moment, name);
     chart.draw(s);
+    const drive = secondDrive(story, name), second = partOf(moment.kind) === "find";
+    if (traces && drive && drive.grid_rad && drive.grid_rad[0].length) traces.draw(drive, second ? moment.t : drive.t_s[0]);
     const told = tell(moment);
     slider.setAttribute("aria-valuenow", Math.round((1000 * s) / length()));
     slider.setAttribute("aria-valuetext", told.join(". "));
@@ -105,7 +108,7 @@ function startPlayer(root) {
     const view = find(".fired"), view_s = drive.view_s ? drive.view_s[i] : null;
     view.hidden = view_s === null || !films[0];
     if (!view.hidden) caption(".fired", films[0](view.querySelector("canvas"), view_s), `view of ${view_s.toFixed(0)} s fired; frame of`);
-    if (brain && drive.grid_rad) brain(drive, i);
+    if (brain && drive.grid_rad && drive.grid_rad[i].length) brain(drive, i);
   }
 
   function caption(figure, t, words) {
@@ -124,6 +127,12 @@ function startPlayer(root) {
   function seek(to) {
     play(false);
     s = Math.min(length(), Math.max(0, to));
+    redraw();
+  }
+
+  function forget() {
+    find(".mark.ramp").style.background = `linear-gradient(90deg, ${ramp().join(",")})`;
+    for (const one of [scene, chart, traces]) if (one) one.forget();
     redraw();
   }
 
@@ -147,8 +156,9 @@ function startPlayer(root) {
       event.preventDefault();
       seek(s + KEYS[event.key] * length());
     });
-    new ResizeObserver(() => { scene.forget(); chart.forget(); redraw(); }).observe(root);
-    dark.addEventListener("change", () => { scene.forget(); chart.forget(); redraw(); });
+    if (strip) strip.addEventListener("pointerdown", (event) => seek(storyTime(segments, 2, traces.at(event.clientX))));
+    new ResizeObserver(forget).observe(root);
+    dark.addEventListener("change", forget);
   }
 
   setUp();

@@ -5,12 +5,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hippodrome.eval.report.files import ScenarioFiles
-from hippodrome.eval.report.markup import Html, data_script, element
+from hippodrome.eval.report.markup import Html, data_script, element, joined
 from hippodrome.eval.report.tables import anchor
 from hippodrome.eval.results.model import Results, ScenarioResult
 
 SPEEDS = (("0.25", "¼ speed"), ("0.5", "½ speed"), ("1", "1× speed"), ("2", "2× speed"), ("4", "4× speed"))
 PARTS = (("map", "1 The map grows"), ("roads", "2 It comes right"), ("find", "3 The car finds itself"))
+MARKS = (  # sign, meaning, and the parts of the story in which it is seen
+    ("truth", "true path", "map roads find"),
+    ("own", "semi-metric map", "map roads"),
+    ("ramp", "on the roads: error 0.1 to 100 m", "roads"),
+    ("fix", "belief (95 %)", "find"),
+    ("view", "view that fired", "find"),
+)
+BRAIN_PARTS = (  # equations are those of Li et al. 2025
+    ("Head-direction ring:", "each cell stands for a heading, and the cells around the believed one are active, Eq. (1)."),
+    ("Grid sheets:", "each cell stands for a place within a period that repeats over the town, Eq. (2); modules of unequal "
+                     "periods together tell one place, the arrow on the map, Eqs. (15) and (16)."),
+    ("Integrator cells (blue):", "move the bump by what wheels and gyro say, and slowly lose certainty."),
+    ("Calibration cells (orange):", "take the pose of a recognised view in, an injection, Eqs. (13) and (14)."),
+    ("Inhibition:", "keeps the activity of a network limited, Eqs. (3) to (5), and lets its two populations compete, "
+                    "Eqs. (6) and (7)."),
+)  # fmt: skip
 MODULES = 3  # sheets that there is room for; a belief with fewer hides the others
 
 
@@ -30,6 +46,15 @@ def player(files: ScenarioFiles) -> Html | None:
         _transport(),
         class_="player", role="region", aria_label="The drive, playing",
     )  # fmt: skip
+
+
+def brain_at_work(files: ScenarioFiles) -> Html | None:
+    """How sure the networks were along the second drive, and one sentence for each part of them; None without a belief."""
+    if files.second is None or not any(any(one.grid_rad) for one in files.second.beliefs):
+        return None
+    canvas = element("canvas", role="img", aria_label="Reliability of both populations of both networks along the second drive")
+    parts = [element("li", element("strong", name), f" {words}") for name, words in BRAIN_PARTS]
+    return joined(element("div", canvas, class_="traces"), element("ul", parts, class_="facts"))
 
 
 def towns(results: Results, found: Sequence[ScenarioFiles]) -> Html | None:
@@ -71,8 +96,8 @@ def _moment() -> Html:
 
 def _legend() -> Html:
     """What the marks mean; the colours are those of the map's layers."""
-    marks = (("truth", "true path"), ("own", "semi-metric map"), ("fix", "belief (95 %)"), ("view", "view that fired"))
-    return element("ul", [element("li", element("i", class_=f"mark {kind}"), words) for kind, words in marks], class_="legend")
+    items = [element("li", element("i", class_=f"mark {kind}"), words, data_in=parts) for kind, words, parts in MARKS]
+    return element("ul", items, class_="legend")
 
 
 def _seen(files: ScenarioFiles) -> Html:

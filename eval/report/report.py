@@ -24,6 +24,7 @@ SCRIPTS: Final = (
     "scene.js",
     "chart.js",
     "brain.js",
+    "traces.js",
     "player.js",
     "compare.js",
     "tables.js",

@@ -14,7 +14,7 @@ from hippodrome.eval.report.evidence import MapEvidence
 from hippodrome.eval.report.files import Picture, ScenarioFiles
 from hippodrome.eval.report.markup import Child, Html, data_script, element, joined
 from hippodrome.eval.report.places import localization_places, mapping_places
-from hippodrome.eval.report.player import player
+from hippodrome.eval.report.player import brain_at_work, player
 from hippodrome.eval.report.tables import (
     anchor,
     break_table,
@@ -57,6 +57,7 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         _titled("Cheaper than ORB-SLAM3", comparison.ratios(files.ratios)),
         _titled("What each method is given", comparison.fairness(scenario)),
         _folded("What each figure means", _definitions(rows)),
+        _titled("The brain at work", brain_at_work(files)),
         _titled("Map", _interactive_map(files) if files.evidence else None),
         _titled("Why is it wrong here? The worst places", mapping_places(files, scenario.name)),
         localization_places(files, scenario.name),

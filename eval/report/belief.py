@@ -50,7 +50,7 @@ class Belief(TimedPath):
 
     name: str  # label of the method in whose map the drive was localized
     heading_rad: list[float]
-    covariance_m2: list[tuple[float, float, float]]  # xx, xy, yy
+    covariance_m2: list[tuple[float, float, float] | None]  # xx, xy, yy; None for a method that states none
     error_m: list[float | None]  # None where there is no truth
     localized: list[bool]
     status: list[Annotated[int, Field(ge=0, le=4)]]  # value of core.types.LocalizationStatus
@@ -177,7 +177,9 @@ def _view(cell: int, cognitive_map: CognitiveMap | None) -> tuple[float, float, 
     return float(cognitive_map.t_s[vertices[0]]), float(x_m), float(y_m)
 
 
-def _covariance(covariance: FloatArray) -> tuple[float, float, float]:
+def _covariance(covariance: FloatArray) -> tuple[float, float, float] | None:
+    if not covariance[:2, :2].any():  # how methods without a covariance fill it in
+        return None
     xx, xy, yy = _significant(np.clip(np.array([covariance[0, 0], covariance[0, 1], covariance[1, 1]]), -UNKNOWN_M2, UNKNOWN_M2))
     return xx, xy, yy
 

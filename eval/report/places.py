@@ -81,11 +81,11 @@ def _worst_steps(belief: Belief) -> list[int]:
 
 
 def _step(belief: Belief, step: int, frames: Thumbnails, evidence: MapEvidence, town: str, files: ScenarioFiles) -> Html:
-    t_s, view_s = belief.t_s[step], belief.view_s[step]
+    t_s, view_s, spread = belief.t_s[step], belief.view_s[step], belief.covariance_m2[step]
     seen = frame_tile(frames, t_s, "tile second") if files.second_frames else None
     fired = frame_tile(evidence.thumbnails, view_s) if files.thumbnails and view_s is not None else None
     facts = [
-        f"95{NBSP}% within {_sure_m(belief.covariance_m2[step]):.2f}{NBSP}m, it said",
+        "it says no covariance" if spread is None else f"95{NBSP}% within {_sure_m(spread):.2f}{NBSP}m, it said",
         f"margin of the last view: {belief.confidence[step]:.2f}",
         "no view has fired yet" if view_s is None else f"right: view of {view_s:.0f}{NBSP}s, the kept frame nearest to it",
     ]

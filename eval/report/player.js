@@ -100,7 +100,7 @@ function startPlayer(root) {
     const drive = secondDrive(story, name), i = before(drive.t_s, t), elapsed = t - drive.t_s[0];
     const known = drive.status ? STATUS[drive.status[i]] : drive.localized[i] ? "localized" : "not localized";
     showBelief(drive, i);
-    const spread = drive.covariance_m2 && drive.localized[i] ? `, 95 % sure within ${metres(ellipseOf(drive.covariance_m2[i]).a)}` : "";
+    const spread = drive.covariance_m2 && drive.covariance_m2[i] && drive.localized[i] ? `, 95 % sure within ${metres(ellipseOf(drive.covariance_m2[i]).a)}` : "";
     return [`Second drive, ${elapsed.toFixed(1)} s`, `${known}${spread}`, drive.localized[i] ? `truly ${metres(drive.error_m[i])} off` : `its guess is ${metres(drive.error_m[i])} off`];
   }
 

@@ -18,6 +18,8 @@ from hippodrome.eval.results.paper_rows import quoted_rows
 
 REPORT: Final = "report.html"
 COMPARE: Final = "compare"  # id of the panel with all scenarios
+# While the page is still being read only its first panel is shown; should a script fail, all of them are.
+EARLY: Final = 'document.documentElement.className="js";addEventListener("error",()=>{document.documentElement.className=""})'
 SCRIPTS: Final = (
     "map.js",
     "story.js",
@@ -85,6 +87,7 @@ def _head() -> Html:
         element("meta", http_equiv="Content-Security-Policy", content=POLICY),
         element("meta", name="color-scheme", content="light dark"),
         element("title", "hippodrome report"),
+        element("script", Html(EARLY)),
         element("style", Html(_asset("style.css"))),
     )
 

@@ -135,7 +135,7 @@ function makeScene(canvas, story) {
     if (truth && truth.t_s.length) trail(truth, t, inks.truth, 1.8);
     const first = drive.localized.indexOf(true);
     if (first >= 0 && drive.t_s[first] <= t) trail(drive, t, story.colours[layer.name], 3, drive.t_s[first]);
-    const spread = drive.covariance_m2 && ellipseOf(drive.covariance_m2[i]);
+    const stated = drive.covariance_m2 && drive.covariance_m2[i], spread = stated && ellipseOf(stated);
     if (!known && (!spread || spread.a > ANYWHERE_M)) drawVeil(colour, 0.13);
     else if (spread) drawEllipse([drive.x_m[i], drive.y_m[i]], spread, colour);
     const view_m = drive.view_m && drive.view_m[i];

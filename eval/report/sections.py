@@ -187,7 +187,7 @@ def _timings(scenario: ScenarioResult) -> Html | None:
         share = value / longest if longest > 0.0 else 0.0
         bar = element("span", class_="bar", style=f"--share:{share:.4f}")
         rows.append([words, f"{value:.3g} {unit}", bar])
-    return plain_table(["Stage", "Time", ""], rows, "stage times") if rows else None
+    return plain_table(["Stage", "Time", "Share of the longest"], rows, "stage times") if rows else None
 
 
 def _unit_of(name: str) -> tuple[str, str]:

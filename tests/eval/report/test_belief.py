@@ -1,5 +1,6 @@
 """What the player shows of the second drive: the belief as it was, sampled, and frames at their times."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import cv2
@@ -107,3 +108,8 @@ def test_a_broken_file_is_an_error_that_names_it(written, change):
     path.write_text(change(path.read_text()))
     with pytest.raises(ResultsError, match=r"belief\.json: .*run `hippodrome eval` again"):
         read_second_drive(path)
+
+
+def test_a_method_that_states_no_covariance_has_none():
+    bare = replace(estimate(FIX), covariance=np.zeros((3, 3)))
+    assert belief_of("other", [bare], TRUTH, None).covariance_m2 == [None]

@@ -17,7 +17,9 @@ from hippodrome.eval.figures.scenario import draw_scenario
 from hippodrome.eval.methods.materials import gather
 from hippodrome.eval.methods.method import SEMI_METRIC
 from hippodrome.eval.methods.warm_up import warm_up
+from hippodrome.eval.report.belief import write_second_drive
 from hippodrome.eval.report.evidence import write_map_evidence
+from hippodrome.eval.report.why import write_why
 from hippodrome.eval.results.evidence import write_trajectories
 from hippodrome.eval.results.model import ScenarioResult
 from hippodrome.eval.results.scenario import scenario_result
@@ -49,6 +51,8 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
     localized = {outcome.method: outcome for outcome in shown if outcome.localized is not None}
     write_trajectories(materials, performance.outcomes)
     write_map_evidence(materials, scored, localized)
+    write_second_drive(materials, localized)
+    write_why(materials.folder, localized)
     if task.figures:
         semi_metric = next((one.mapped.cognitive_map for one in performance.outcomes if one.method == SEMI_METRIC), None)
         draw_scenario(materials, semi_metric, scored, localized)

@@ -37,11 +37,11 @@ ROAD_TOLERANCE_M = 0.2  # by which centrelines are simplified: less than a pixel
 DECIMALS_M = 2  # of every number in the file
 
 
-class _Model(BaseModel):
+class EvidenceModel(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
 
-class TimedPath(_Model):
+class TimedPath(EvidenceModel):
     """Time-stamped positions in the network frame."""
 
     t_s: list[float]
@@ -66,7 +66,7 @@ class LocalizedDrive(TimedPath):
     localized: list[bool]
 
 
-class Thumbnails(_Model):
+class Thumbnails(EvidenceModel):
     """The tiles of ``thumbnails.jpg``, row by row."""
 
     t_s: list[float]
@@ -75,7 +75,7 @@ class Thumbnails(_Model):
     height: Annotated[int, Field(gt=0)]
 
 
-class MapEvidence(_Model):
+class MapEvidence(EvidenceModel):
     """The content of ``map.json``."""
 
     roads: list[list[float]]  # centrelines near the true path, each as x, y, x, y, ... in m
@@ -95,15 +95,15 @@ def write_map_evidence(
     recording, truth = materials.mapping, materials.mapping.ground_truth()
     layers = [_layer(method, one, truth) for method, one in scored.items()]
     frames = _chosen_frames(recording, layers)
-    sheet, columns = _sheet(recording, frames)
+    sheet, columns = frame_sheet(recording, frames)
     x_m, y_m, heading_rad = (float(value) for value in truth.poses[0])
     evidence = MapEvidence(
         roads=_roads(materials.roads, truth.poses),
-        truth=_path(truth),
+        truth=timed_path(truth),
         methods=layers,
         drives=[_drive(method, outcome) for method, outcome in localized.items()],
         thumbnails=Thumbnails(
-            t_s=_rounded(_frame_times_s(recording)[frames]),
+            t_s=rounded(frame_times_s(recording)[frames]),
             columns=columns,
             width=TILE_WIDTH,
             height=sheet.shape[0] // -(-len(frames) // columns),
@@ -174,7 +174,7 @@ def _layer(method: Method, one: ScoredTrajectory, truth: Trajectory) -> Layer:
     return Layer(
         name=method.label,
         frame=method.frame,
-        **_columns(one.trajectory.t_s, placed_m),
+        **timed_columns(one.trajectory.t_s, placed_m),
         error_m=[None if np.isnan(error) else round(float(error), DECIMALS_M) for error in errors_m],
         worst=worst_places(errors_m),
     )
@@ -189,8 +189,8 @@ def _drive(method: Method, outcome: Outcome) -> LocalizedDrive:
     poses = np.array([at[float(t_s)] for t_s in score.t_s[seconds]])
     return LocalizedDrive(
         name=method.label,
-        **_columns(score.t_s[seconds], poses),
-        error_m=_rounded(score.errors_m[seconds]),
+        **timed_columns(score.t_s[seconds], poses),
+        error_m=rounded(score.errors_m[seconds]),
         localized=[bool(known) for known in score.localized[seconds]],
     )
 
@@ -200,30 +200,30 @@ def _roads(network: RoadNetwork, path_m: FloatArray) -> list[list[float]]:
     low, high = path_m[:, :2].min(axis=0) - MARGIN_M, path_m[:, :2].max(axis=0) + MARGIN_M
     lines = (network.lane_points_m(lane) for lane in range(network.lane_count))
     near = (line for line in lines if np.all(line.max(axis=0) >= low) and np.all(line.min(axis=0) <= high))
-    return [_rounded(np.array(LineString(line).simplify(ROAD_TOLERANCE_M).coords).ravel()) for line in near]
+    return [rounded(np.array(LineString(line).simplify(ROAD_TOLERANCE_M).coords).ravel()) for line in near]
 
 
-def _path(truth: Trajectory) -> TimedPath:
+def timed_path(truth: Trajectory) -> TimedPath:
     steps = np.unique(np.searchsorted(truth.t_s, np.arange(truth.t_s[0], truth.t_s[-1], TRUTH_STEP_S)))
-    return TimedPath(**_columns(truth.t_s[steps], truth.poses[steps]))
+    return TimedPath(**timed_columns(truth.t_s[steps], truth.poses[steps]))
 
 
-def _columns(t_s: FloatArray, poses: FloatArray) -> dict[str, list[float]]:
-    return {"t_s": _rounded(t_s), "x_m": _rounded(poses[:, 0]), "y_m": _rounded(poses[:, 1])}
+def timed_columns(t_s: FloatArray, poses: FloatArray) -> dict[str, list[float]]:
+    return {"t_s": rounded(t_s), "x_m": rounded(poses[:, 0]), "y_m": rounded(poses[:, 1])}
 
 
-def _rounded(values: FloatArray) -> list[float]:
+def rounded(values: FloatArray) -> list[float]:
     return [round(float(value), DECIMALS_M) for value in values]
 
 
-def _frame_times_s(recording: Recording) -> FloatArray:
+def frame_times_s(recording: Recording) -> FloatArray:
     times_s: FloatArray = recording.samples.t_s[recording.samples.frame_steps]
     return times_s
 
 
 def _chosen_frames(recording: Recording, layers: list[Layer]) -> list[int]:
     """Numbers of the frames spread evenly over the drive, and of the one nearest to each method's worst places."""
-    times_s = _frame_times_s(recording)
+    times_s = frame_times_s(recording)
     even = np.linspace(0, recording.frame_count - 1, EVEN_FRAMES).astype(int)
     worst_s = np.array([layer.t_s[vertex] for layer in layers for vertex in layer.worst])
     after = np.clip(np.searchsorted(times_s, worst_s), 1, len(times_s) - 1)
@@ -231,7 +231,7 @@ def _chosen_frames(recording: Recording, layers: list[Layer]) -> list[int]:
     return [int(number) for number in np.unique(np.concatenate([even, nearest]))]
 
 
-def _sheet(recording: Recording, frames: list[int]) -> tuple[NDArray[np.uint8], int]:
+def frame_sheet(recording: Recording, frames: list[int]) -> tuple[NDArray[np.uint8], int]:
     """The frames as tiles of one RGB picture, row by row, and the number of tiles in a row."""
     first = recording.frame(frames[0])
     height = max(round(TILE_WIDTH * first.shape[0] / first.shape[1]), 1)

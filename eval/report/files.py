@@ -13,7 +13,9 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from hippodrome.eval.methods.method import REFINED
+from hippodrome.eval.report.belief import BELIEF_JSON, SECOND_FRAMES, SecondDrive, read_second_drive
 from hippodrome.eval.report.evidence import MAP_JSON, THUMBNAILS, MapEvidence, read_map_evidence
+from hippodrome.eval.report.why import WHY_JSON, Places, read_why
 from hippodrome.eval.results.model import ResultsError
 from hippodrome.eval.results.ratios import RATIOS
 from hippodrome.eval.results.table_two import TABLE_TWO, SequenceRow
@@ -55,6 +57,9 @@ class ScenarioFiles:
     thumbnails: str | None  # data URI of the sheet
     sequences: tuple[SequenceRow, ...] = ()  # rows of Table II
     ratios: Mapping[str, Any] = field(default_factory=dict)  # content of ratios.json
+    second: SecondDrive | None = None  # what the localizer believed on the second drive
+    second_frames: str | None = None  # data URI of that drive's sheet
+    why: Places | None = None  # what is known about the worst places of the first drive
 
 
 def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
@@ -67,13 +72,16 @@ def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
     if Path(name).name != name or not folder.is_dir():
         return ScenarioFiles((), None, None)
     figures = sorted(folder.glob("*.png"), key=lambda path: (_order(path.stem), path.stem))
-    frames = folder / THUMBNAILS
+    frames, second, second_frames = (folder / name for name in (THUMBNAILS, BELIEF_JSON, SECOND_FRAMES))
     return ScenarioFiles(
         tuple(picture for path in figures if (picture := _picture(path)) is not None),
         read_map_evidence(folder / MAP_JSON) if (folder / MAP_JSON).exists() else None,
         data_uri("image/jpeg", frames.read_bytes()) if frames.exists() else None,
         tuple(_parsed(folder / TABLE_TWO, list[SequenceRow]) or ()),
         _parsed(folder / RATIOS, dict[str, Any]) or {},
+        read_second_drive(second) if second.exists() else None,
+        data_uri("image/jpeg", second_frames.read_bytes()) if second_frames.exists() else None,
+        read_why(folder / WHY_JSON) if (folder / WHY_JSON).exists() else None,
     )
 
 

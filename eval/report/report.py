@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
 from hippodrome._files import write_atomically
-from hippodrome.eval.report.files import read_scenario_files
+from hippodrome.eval.report.files import ScenarioFiles, read_scenario_files
 from hippodrome.eval.report.markup import Html, element, joined
+from hippodrome.eval.report.player import towns
 from hippodrome.eval.report.sections import scenario_section
 from hippodrome.eval.report.tables import anchor, overview
 from hippodrome.eval.results.model import Results, read_results
 from hippodrome.eval.results.paper_rows import quoted_rows
 
 REPORT: Final = "report.html"
+COMPARE: Final = "compare"  # id of the panel with all scenarios
+# While the page is still being read only its first panel is shown; should a script fail, all of them are.
+EARLY: Final = 'document.documentElement.className="js";addEventListener("error",()=>{document.documentElement.className=""})'
+SCRIPTS: Final = (
+    "map.js",
+    "story.js",
+    "scene.js",
+    "chart.js",
+    "brain.js",
+    "traces.js",
+    "player.js",
+    "compare.js",
+    "tables.js",
+    "tabs.js",
+)  # each uses those before it
 # The page asks no server for anything: pictures, style and script are in the file itself.
 POLICY: Final = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
@@ -33,21 +50,33 @@ def write_report(out: Path) -> Path:
 def report_html(results: Results, out: Path) -> str:
     """The page. Figures, maps and frames are taken from below ``out`` as far as they exist. Raises ResultsError."""
     quoted = quoted_rows()
-    sections = [
-        scenario_section(place, scenario, quoted, read_scenario_files(out, scenario.name))
-        for place, scenario in enumerate(results.scenarios)
-    ]
-    links = [element("a", one.name, href=f"#{anchor(place)}") for place, one in enumerate(results.scenarios)]
+    found = [read_scenario_files(out, scenario.name) for scenario in results.scenarios]
+    sections = [scenario_section(place, one, quoted, found[place]) for place, one in enumerate(results.scenarios)]
+    links = [element("a", "Compare", href=f"#{COMPARE}")]
+    links += [element("a", one.name, href=f"#{anchor(place)}") for place, one in enumerate(results.scenarios)]
     body = element(
         "body",
-        element("header", element("h1", "Topometric maps, scored"), element("p", _lede(results)), element("nav", links)),
-        element("main", element("section", element("h2", "All scenarios"), overview(results, quoted)), sections),
+        element("header", element("h1", "Topometric maps, scored"), element("nav", links, class_="tabs", aria_label="Towns")),
+        element("main", _all_scenarios(results, found), sections),
         element("footer", "Made by ", element("code", "hippodrome eval"), "; ", element("code", "hippodrome report DIR"),
                 " makes it again from results.json and the files beside it."),
         element("dialog", element("button", element("img", alt=""), type="button", aria_label="Close")),
-        element("script", Html(_asset("map.js"))),
+        element("script", Html("\n".join(_asset(name) for name in SCRIPTS))),
     )  # fmt: skip
     return "<!doctype html>\n" + element("html", _head(), body, lang="en") + "\n"
+
+
+def _all_scenarios(results: Results, found: Sequence[ScenarioFiles]) -> Html:
+    """The first panel: what was done, every town at a look, and one line of figures for each."""
+    return element(
+        "section",
+        element("p", _lede(results), class_="lede"),
+        towns(results, found),
+        element("h2", "All scenarios"),
+        overview(results, quoted_rows()),
+        class_="panel",
+        id=COMPARE,
+    )
 
 
 def _head() -> Html:
@@ -58,6 +87,7 @@ def _head() -> Html:
         element("meta", http_equiv="Content-Security-Policy", content=POLICY),
         element("meta", name="color-scheme", content="light dark"),
         element("title", "hippodrome report"),
+        element("script", Html(EARLY)),
         element("style", Html(_asset("style.css"))),
     )
 

@@ -13,6 +13,8 @@ from hippodrome.eval.report.commands import command_lines
 from hippodrome.eval.report.evidence import MapEvidence
 from hippodrome.eval.report.files import Picture, ScenarioFiles
 from hippodrome.eval.report.markup import Child, Html, data_script, element, joined
+from hippodrome.eval.report.places import localization_places, mapping_places
+from hippodrome.eval.report.player import brain_at_work, player
 from hippodrome.eval.report.tables import (
     anchor,
     break_table,
@@ -20,7 +22,6 @@ from hippodrome.eval.report.tables import (
     mapping_table,
     plain_table,
     scrolling,
-    worst_places,
 )
 from hippodrome.eval.results.aligned import aligned_note
 from hippodrome.eval.results.model import Row, ScenarioResult
@@ -44,6 +45,7 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
     return element(
         "section",
         element("h2", scenario.name, " ", _verdict(scenario)),
+        player(files),
         element("p", scenario_title(scenario), class_="note"),
         _failures(scenario),
         _headline(scenario),
@@ -54,18 +56,26 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         _titled("Ten sequences from unknown starts (Table II)", comparison.sequences(files.sequences)),
         _titled("Cheaper than ORB-SLAM3", comparison.ratios(files.ratios)),
         _titled("What each method is given", comparison.fairness(scenario)),
-        _folded("What each figure means", element("ul", [element("li", line) for line in definitions(rows)])),
+        _folded("What each figure means", _definitions(rows)),
+        _titled("The brain at work", brain_at_work(files)),
         _titled("Map", _interactive_map(files) if files.evidence else None),
-        _titled("Worst places", worst_places(files.evidence, files.thumbnails is not None) if files.evidence else None),
+        _titled("Why is it wrong here? The worst places", mapping_places(files, scenario.name)),
+        localization_places(files, scenario.name),
         _titled("Breaks", break_table(scenario)),
         _titled("Figures", _gallery(files.pictures) if files.pictures else None),
         _titled("Stage times", _timings(scenario)),
         element("h3", "Run it again"),
         _commands(scenario, files.evidence),
         _folded("Effective configuration", _configuration(scenario)),
+        class_="panel",
+        data_town=scenario.name,
         id=anchor(place),
         style=_frames_style(files),
     )
+
+
+def _definitions(rows: Sequence[Row]) -> Html:
+    return element("ul", [element("li", line) for line in definitions(rows)], class_="definitions")
 
 
 def _titled(title: str, content: Html | None) -> Html | None:
@@ -177,7 +187,7 @@ def _timings(scenario: ScenarioResult) -> Html | None:
         share = value / longest if longest > 0.0 else 0.0
         bar = element("span", class_="bar", style=f"--share:{share:.4f}")
         rows.append([words, f"{value:.3g} {unit}", bar])
-    return plain_table(["Stage", "Time", ""], rows, "stage times") if rows else None
+    return plain_table(["Stage", "Time", "Share of the longest"], rows, "stage times") if rows else None
 
 
 def _unit_of(name: str) -> tuple[str, str]:
@@ -214,4 +224,5 @@ def _frames_style(files: ScenarioFiles) -> str | None:
         return None
     sheet = files.evidence.thumbnails
     rows = -(-len(sheet.t_s) // sheet.columns)
-    return f"--sheet:url({files.thumbnails});--columns:{sheet.columns};--rows:{rows};--ratio:{sheet.width}/{sheet.height}"
+    second = f"--sheet2:url({files.second_frames});" if files.second_frames else ""
+    return f"{second}--sheet:url({files.thumbnails});--columns:{sheet.columns};--rows:{rows};--ratio:{sheet.width}/{sheet.height}"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
+from typing import Final
 
-from hippodrome.eval.methods.method import method_of
-from hippodrome.eval.report.evidence import Layer, MapEvidence
-from hippodrome.eval.report.markup import Child, Html, element, joined
+from hippodrome.eval.report.markup import Child, Html, element
 from hippodrome.eval.results.model import Results, Row, ScenarioResult
 from hippodrome.eval.results.tables import (
     LOCALIZATION_COLUMNS,
@@ -19,7 +19,11 @@ from hippodrome.eval.results.tables import (
     row_cells,
 )
 
-FRAME_LABEL = "camera frame at {:.0f} s"
+FIRST: Final = ("APE (m)", "Success", "Error (m)")  # columns beside the method's name, so that a phone shows them unscrolled
+SPLIT: Final = {  # headings of cells that hold several figures, and those of one column for each figure
+    "APE median / p95 / max": ("APE median (m)", "APE p95 (m)", "APE max (m)"),
+    "Latency (ms)": ("Latency median (ms)", "Latency p99 (ms)"),
+}
 
 
 def scrolling(table: Html, label: str) -> Html:
@@ -90,34 +94,6 @@ def localization_table(scenario: ScenarioResult, quoted: Sequence[Row]) -> Html 
     return _row_table(LOCALIZATION_COLUMNS, rows, f"{scenario.name}: localization") if rows else None
 
 
-def worst_places(evidence: MapEvidence, with_frames: bool) -> Html:
-    """Where each method in the network's frame is worst, and what the camera saw there; buttons show the places on the map."""
-    layers = [layer for layer in evidence.methods if method_of(layer.name, layer.frame).frame == "network"]
-    return joined([_worst_of(layer, evidence, with_frames) for layer in layers])
-
-
-def _worst_of(layer: Layer, evidence: MapEvidence, with_frames: bool) -> Html:
-    cards = [_worst_card(layer, vertex, evidence, with_frames) for vertex in layer.worst]
-    return element("div", element("h4", layer.name), element("div", cards, class_="cards"))
-
-
-def _worst_card(layer: Layer, vertex: int, evidence: MapEvidence, with_frames: bool) -> Html:
-    t_s, error_m = layer.t_s[vertex], layer.error_m[vertex] or 0.0
-    words = joined(
-        element("strong", f"{error_m:.2f}\N{NO-BREAK SPACE}m"), element("small", f"vertex {vertex}, {t_s:.0f}\N{NO-BREAK SPACE}s")
-    )
-    return element("button", frame_tile(evidence, t_s) if with_frames else None, words, type="button", class_="goto card",
-                   data_method=layer.name, data_vertex=vertex, title="Show on the map")  # fmt: skip
-
-
-def frame_tile(evidence: MapEvidence, t_s: float) -> Html:
-    """The embedded frame nearest to a time, cut out of the sheet."""
-    times, columns = evidence.thumbnails.t_s, evidence.thumbnails.columns
-    tile = min(range(len(times)), key=lambda place: abs(times[place] - t_s))
-    return element("div", class_="tile", role="img", aria_label=FRAME_LABEL.format(times[tile]),
-                   style=f"--column:{tile % columns};--row:{tile // columns}")  # fmt: skip
-
-
 def break_table(scenario: ScenarioResult) -> Html | None:
     """Stretches of vertices that the road match does not vouch for, and why; None if there are none."""
     rows = [
@@ -129,10 +105,22 @@ def break_table(scenario: ScenarioResult) -> Html | None:
 
 
 def _row_table(columns: Sequence[Column], rows: Sequence[Row], label: str) -> Html:
-    columns = filled_columns(columns, rows)
+    filled = sorted(filled_columns(columns, rows)[1:], key=lambda column: column.title not in FIRST)
+    columns = [columns[0], *(part for column in filled for part in _parts(column))]
     head = element("tr", [element("th", column.title, scope="col") for column in columns])
     body = [_row_line(row_cells(columns, row), row) for row in rows]
     return scrolling(element("table", element("thead", head), element("tbody", body)), label)
+
+
+def _parts(column: Column) -> list[Column]:
+    """One column for each figure of a cell, which the cell separates by slashes; a column of single figures is itself."""
+    titles = SPLIT.get(column.title, ())
+    return [Column(title, partial(_part, column, place)) for place, title in enumerate(titles)] or [column]
+
+
+def _part(column: Column, place: int, row: Row) -> str:
+    parts = column.cell(row).split(" / ")
+    return parts[place] if place < len(parts) else NONE
 
 
 def _row_line(cells: Sequence[str], row: Row) -> Html:

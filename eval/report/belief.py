@@ -1,0 +1,197 @@
+"""What the report's player shows of the second drive, as files beside the results: ``belief.json`` and ``frames-second.jpg``.
+
+The belief is sampled: often in the first seconds, in which the localizer finds itself, and twice a second afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Final
+
+import cv2
+import numpy as np
+from pydantic import Field, ValidationError
+
+from hippodrome._files import write_atomically
+from hippodrome.core.types import CognitiveMap, FloatArray, IntArray, LocalizationEstimate, Trajectory
+from hippodrome.eval.methods.materials import Materials, Outcome
+from hippodrome.eval.methods.method import Method
+from hippodrome.eval.report.evidence import (
+    DECIMALS_M,
+    JPEG_QUALITY,
+    EvidenceModel,
+    Thumbnails,
+    TimedPath,
+    frame_sheet,
+    frame_times_s,
+    rounded,
+    timed_columns,
+    timed_path,
+)
+from hippodrome.eval.results.model import MAX_BYTES, ResultsError
+from hippodrome.sim.recording import Recording
+
+BELIEF_JSON: Final = "belief.json"
+SECOND_FRAMES: Final = "frames-second.jpg"
+SETTLING_S: Final = 20.0  # the initial localization of the paper takes less; in it the belief changes from step to step
+SETTLING_STEP_S, STEP_S = (
+    0.2,
+    0.5,
+)  # between two samples of the belief, while it settles and afterwards: a car drives 5 m in 0.5 s
+FRAMES: Final = 120  # thumbnails of the second drive, which is shorter than the first
+SETTLING_FRAMES: Final = 20  # of them in the first seconds: one a second
+UNKNOWN_M2: Final = 1e8  # variances above (10 km)^2 say "anywhere"
+DIGITS: Final = 4  # significant digits of what is drawn as activity
+
+
+class Belief(TimedPath):
+    """What a localizer believed at each time: N samples."""
+
+    name: str  # label of the method in whose map the drive was localized
+    heading_rad: list[float]
+    covariance_m2: list[tuple[float, float, float] | None]  # xx, xy, yy; None for a method that states none
+    error_m: list[float | None]  # None where there is no truth
+    localized: list[bool]
+    status: list[Annotated[int, Field(ge=0, le=4)]]  # value of core.types.LocalizationStatus
+    confidence: list[float]
+    view_s: list[float | None]  # time in the mapping drive at which the view that fired was first stored
+    view_m: list[tuple[float, float] | None]  # and where the map has it
+    head_rad: list[list[float]]  # (2,) per sample: integrator, calibration
+    head_reliability: list[list[float]]
+    grid_rad: list[list[float]]  # (modules x 2 populations x 2 axes,) per sample
+    grid_reliability: list[list[float]]
+
+
+class SecondDrive(EvidenceModel):
+    """The content of ``belief.json``."""
+
+    truth: TimedPath
+    frames: Thumbnails
+    beliefs: list[Belief]
+
+
+def write_second_drive(materials: Materials, localized: Mapping[Method, Outcome]) -> None:
+    """Write the second drive: where it really was, what its camera saw, and what each localizer believed.
+
+    Args:
+        materials: What was evaluated.
+        localized: The methods that localized the second drive.
+    """
+    if not localized:
+        return
+    drive, truth = materials.drive, materials.drive.ground_truth()
+    frames = _spread(drive)
+    sheet, columns = frame_sheet(drive, frames)
+    height = sheet.shape[0] // -(-len(frames) // columns)
+    tiles = Thumbnails(t_s=rounded(frame_times_s(drive)[frames]), columns=columns, width=sheet.shape[1] // columns, height=height)
+    beliefs = [
+        belief_of(method.label, outcome.localization.estimates, truth, outcome.refined)
+        for method, outcome in localized.items()
+        if outcome.localization is not None and outcome.localization.estimates
+    ]
+    _, jpeg = cv2.imencode(".jpg", sheet[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    write_atomically(materials.folder / SECOND_FRAMES, jpeg.tobytes())
+    content = SecondDrive(truth=timed_path(truth), frames=tiles, beliefs=beliefs)
+    write_atomically(materials.folder / BELIEF_JSON, f"{content.model_dump_json()}\n".encode())
+
+
+def belief_of(name: str, estimates: list[LocalizationEstimate], truth: Trajectory, cognitive_map: CognitiveMap | None) -> Belief:
+    """The samples of one localizer's estimates.
+
+    Args:
+        name: Label of the method.
+        estimates: One per observation, at least one.
+        truth: The drive's true trajectory; it may lack some of the times.
+        cognitive_map: The map that it was localized in; None if it is not one of our kind, and then no view is named.
+    """
+    times_s = np.array([one.t_s for one in estimates])
+    chosen = [estimates[step] for step in _steps(times_s)]
+    poses = np.array([one.pose for one in chosen])
+    shown_s = np.array([one.t_s for one in chosen])
+    views = [_view(one.view_cell, cognitive_map) for one in chosen]
+    return Belief(
+        name=name,
+        **timed_columns(shown_s, poses),
+        heading_rad=_significant(poses[:, 2]),
+        covariance_m2=[_covariance(one.covariance) for one in chosen],
+        error_m=_errors_m(shown_s, poses, truth),
+        localized=[bool(one.localized) for one in chosen],
+        status=[int(one.status) for one in chosen],
+        confidence=_significant(np.array([one.confidence for one in chosen])),
+        view_s=[None if view is None else round(view[0], DECIMALS_M) for view in views],
+        view_m=[None if view is None else (round(view[1], DECIMALS_M), round(view[2], DECIMALS_M)) for view in views],
+        head_rad=[_significant(one.head_direction_rad) for one in chosen],
+        head_reliability=[_significant(one.head_reliability) for one in chosen],
+        grid_rad=[_significant(np.ravel(one.grid_phase_rad)) for one in chosen],
+        grid_reliability=[_significant(np.ravel(one.grid_reliability)) for one in chosen],
+    )
+
+
+def read_second_drive(path: Path) -> SecondDrive:
+    """Read and validate ``belief.json``. Raises ResultsError."""
+    try:
+        if (size := path.stat().st_size) > MAX_BYTES:
+            raise ResultsError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
+        content = SecondDrive.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError) as error:
+        reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
+        raise ResultsError(f"{path}: not a readable second drive: {reason}; run `hippodrome eval` again") from error
+    for belief in content.beliefs:
+        columns = (value for value in belief.model_dump().values() if isinstance(value, list))
+        if len({len(column) for column in columns}) != 1:
+            raise ResultsError(f"{path}: the columns of '{belief.name}' do not fit together; run `hippodrome eval` again")
+    return content
+
+
+def _steps(times_s: FloatArray) -> IntArray:
+    """Numbers of the samples among the steps at ``times_s`` (N,)."""
+    settled_s = times_s[0] + SETTLING_S
+    wanted = np.concatenate(
+        [
+            np.arange(times_s[0], min(settled_s, times_s[-1]), SETTLING_STEP_S),
+            np.arange(settled_s, times_s[-1], STEP_S),
+            times_s[-1:],
+        ]
+    )
+    steps: IntArray = np.unique(np.clip(np.searchsorted(times_s, wanted - 1e-6), 0, len(times_s) - 1))
+    return steps
+
+
+def _spread(recording: Recording) -> list[int]:
+    """Numbers of frames: one a second while the belief settles, and spread evenly over the drive."""
+    times_s = frame_times_s(recording)
+    settling = np.searchsorted(times_s, times_s[0] + np.linspace(0.0, SETTLING_S, SETTLING_FRAMES, endpoint=False))
+    even = np.linspace(0, len(times_s) - 1, FRAMES - SETTLING_FRAMES).astype(int)
+    return [int(number) for number in np.unique(np.clip(np.concatenate([settling, even]), 0, len(times_s) - 1))]
+
+
+def _view(cell: int, cognitive_map: CognitiveMap | None) -> tuple[float, float, float] | None:
+    """Time and place of the first vertex that has a view cell."""
+    if cell < 0 or cognitive_map is None:
+        return None
+    vertices = np.flatnonzero(cognitive_map.view_cell == cell)
+    if len(vertices) == 0:
+        return None
+    x_m, y_m = cognitive_map.poses[vertices[0], :2]
+    return float(cognitive_map.t_s[vertices[0]]), float(x_m), float(y_m)
+
+
+def _covariance(covariance: FloatArray) -> tuple[float, float, float] | None:
+    if not covariance[:2, :2].any():  # how methods without a covariance fill it in
+        return None
+    xx, xy, yy = _significant(np.clip(np.array([covariance[0, 0], covariance[0, 1], covariance[1, 1]]), -UNKNOWN_M2, UNKNOWN_M2))
+    return xx, xy, yy
+
+
+def _errors_m(times_s: FloatArray, poses: FloatArray, truth: Trajectory) -> list[float | None]:
+    """Distances to the truth, linear in time; None outside of its times."""
+    x_m, y_m = (np.interp(times_s, truth.t_s, truth.poses[:, axis], left=np.nan, right=np.nan) for axis in (0, 1))
+    errors_m = np.hypot(poses[:, 0] - x_m, poses[:, 1] - y_m)
+    return [None if np.isnan(error) else round(float(error), DECIMALS_M) for error in errors_m]
+
+
+def _significant(values: FloatArray) -> list[float]:
+    """Values with few digits, infinite and missing ones as the largest and 0."""
+    finite = np.nan_to_num(np.asarray(values, dtype=float), nan=0.0, posinf=UNKNOWN_M2, neginf=-UNKNOWN_M2)
+    return [float(f"{value:.{DIGITS}g}") for value in finite]

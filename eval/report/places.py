@@ -1,0 +1,119 @@
+"""Why is it wrong here? The places at which a map or a localizer is worst, with what was seen and known there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+from urllib.parse import quote
+
+import numpy as np
+
+from hippodrome.eval.methods.method import method_of
+from hippodrome.eval.report.belief import Belief
+from hippodrome.eval.report.evidence import Layer, MapEvidence, Thumbnails, worst_places
+from hippodrome.eval.report.files import ScenarioFiles
+from hippodrome.eval.report.markup import Html, element, joined
+from hippodrome.eval.report.why import WITHIN_95, Place
+
+FRAME_LABEL: Final = "camera frame at {:.0f} s"
+WORST_STEPS: Final = 4  # of the second drive that are shown
+APART_STEPS: Final = 10  # samples (5 s) between two of them at least
+NBSP: Final = "\N{NO-BREAK SPACE}"
+
+
+def mapping_places(files: ScenarioFiles, town: str) -> Html | None:
+    """Where each method in the network's frame is worst on the first drive; buttons show the places on the map below."""
+    evidence = files.evidence
+    if evidence is None:
+        return None
+    known = {(place.method, place.vertex): place for place in files.why.places} if files.why else {}
+    layers = [layer for layer in evidence.methods if method_of(layer.name, layer.frame).frame == "network"]
+    groups = []
+    for layer in layers:
+        cards = [_vertex(layer, vertex, evidence, known.get((layer.name, vertex)), town, files) for vertex in layer.worst]
+        groups.append(element("div", element("h4", f"{layer.name}, first drive"), element("div", cards, class_="cards")))
+    return joined(groups)
+
+
+def localization_places(files: ScenarioFiles, town: str) -> Html | None:
+    """Where each localizer was worst while it said that it was localized: the frame beside the view that fired."""
+    if files.second is None or files.evidence is None:
+        return None
+    groups = [
+        element("div", element("h4", f"{belief.name}, second drive"), element("div", cards, class_="cards pairs"))
+        for belief in files.second.beliefs
+        if (cards := [_step(belief, step, files.second.frames, files.evidence, town, files) for step in _worst_steps(belief)])
+    ]
+    return joined(groups) if groups else None
+
+
+def _vertex(layer: Layer, vertex: int, evidence: MapEvidence, place: Place | None, town: str, files: ScenarioFiles) -> Html:
+    t_s, error_m = layer.t_s[vertex], layer.error_m[vertex] or 0.0
+    words = joined(element("strong", f"{error_m:.2f}{NBSP}m"), element("small", f"vertex {vertex}, {t_s:.0f}{NBSP}s"))
+    tile = frame_tile(evidence.thumbnails, t_s) if files.thumbnails else None
+    button = element("button", tile, words, type="button", class_="goto card",
+                     data_method=layer.name, data_vertex=vertex, title="Show on the map")  # fmt: skip
+    return element("div", button, _list(_vertex_facts(place)) if place else None, _link(town, 1, t_s), class_="place")
+
+
+def _vertex_facts(place: Place) -> list[str]:
+    """What the map says of a vertex, a line each."""
+    lane = f"lane {place.lane}" + (f" at {place.position_m:.0f}{NBSP}m" if place.position_m is not None else "")
+    facts = [f"{place.status}: {lane}" if place.lane is not None else place.status]
+    if place.sure_m is not None:
+        facts.append(f"the map says 95{NBSP}% within {place.sure_m:.2f}{NBSP}m")
+    if place.since_closure_m is None:
+        facts.append("no loop was closed before")
+    elif place.since_closure_m == 0.0:
+        facts.append(f"closes a loop with the view of {place.closed_with_s:.0f}{NBSP}s")
+    else:
+        facts.append(f"{place.since_closure_m:.0f}{NBSP}m since a loop was closed (view of {place.closed_with_s:.0f}{NBSP}s)")
+    near = [f"{one.apart_m:.1f}{NBSP}m away, {'no truth' if one.error_m is None else f'{one.error_m:.2f}{NBSP}m off'}"
+            for one in place.neighbours]  # fmt: skip
+    return [*facts, f"other passes: {'; '.join(near)}" if near else "no other pass of this street"]
+
+
+def _worst_steps(belief: Belief) -> list[int]:
+    """Samples with the largest errors among those that were declared localized."""
+    pairs = zip(belief.error_m, belief.localized, strict=True)
+    errors_m = [error if known and error is not None else float("nan") for error, known in pairs]
+    return worst_places(np.array(errors_m), WORST_STEPS, APART_STEPS)
+
+
+def _step(belief: Belief, step: int, frames: Thumbnails, evidence: MapEvidence, town: str, files: ScenarioFiles) -> Html:
+    t_s, view_s, spread = belief.t_s[step], belief.view_s[step], belief.covariance_m2[step]
+    seen = frame_tile(frames, t_s, "tile second") if files.second_frames else None
+    fired = frame_tile(evidence.thumbnails, view_s) if files.thumbnails and view_s is not None else None
+    facts = [
+        "it says no covariance" if spread is None else f"95{NBSP}% within {_sure_m(spread):.2f}{NBSP}m, it said",
+        f"margin of the last view: {belief.confidence[step]:.2f}",
+        "no view has fired yet" if view_s is None else f"right: view of {view_s:.0f}{NBSP}s, the kept frame nearest to it",
+    ]
+    words = joined(element("strong", f"{belief.error_m[step] or 0.0:.2f}{NBSP}m"), element("small", f"{t_s:.0f}{NBSP}s"))
+    pictures = element("div", seen, fired, class_="pair")
+    return element("div", element("div", pictures, words, class_="card"), _list(facts), _link(town, 2, t_s), class_="place")
+
+
+def _sure_m(covariance_m2: tuple[float, float, float]) -> float:
+    """Half axis of the ellipse that holds 95 %."""
+    xx, xy, yy = covariance_m2
+    largest = (xx + yy) / 2.0 + (((xx - yy) / 2.0) ** 2 + xy**2) ** 0.5
+    return float(WITHIN_95 * max(largest, 0.0) ** 0.5)
+
+
+def _list(facts: Sequence[str]) -> Html:
+    return element("ul", [element("li", fact) for fact in facts], class_="facts")
+
+
+def _link(town: str, drive: int, t_s: float) -> Html:
+    """A link that opens the player at a time of one of the drives."""
+    return element("a", "Play from here", href=f"#town={quote(town, safe='')}&drive={drive}&t={t_s:.1f}")
+
+
+def frame_tile(tiles: Thumbnails, t_s: float, kind: str = "tile") -> Html:
+    """The embedded frame nearest to a time, cut out of its sheet."""
+    tile = min(range(len(tiles.t_s)), key=lambda place: abs(tiles.t_s[place] - t_s))
+    rows = -(-len(tiles.t_s) // tiles.columns)
+    style = f"--column:{tile % tiles.columns};--row:{tile // tiles.columns}"
+    own = f";--columns:{tiles.columns};--rows:{rows};--ratio:{tiles.width}/{tiles.height}" if kind != "tile" else ""
+    return element("div", class_=kind, role="img", aria_label=FRAME_LABEL.format(tiles.t_s[tile]), style=style + own)

@@ -1,0 +1,174 @@
+// The first screen of a town: the drive playing on the map, what the camera sees, what the localizer believes, and the error.
+
+const FULL_STORY_S = 45; // the whole story takes so long at speed 1
+const KEYS = { ArrowRight: 0.005, ArrowUp: 0.005, ArrowLeft: -0.005, ArrowDown: -0.005, PageUp: 0.05, PageDown: -0.05, Home: -1, End: 1 };
+const STATUS = ["nowhere yet: it could be anywhere", "localized", "off the map", "in doubt: the views speak for another place", "lost"];
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+
+/** A sheet of frames that is decoded once; draws the frame nearest in time on a canvas and returns its time. */
+function makeFilm(address, tiles) {
+  const image = new Image();
+  image.src = address.trim().replace(/^url\(["']?/, "").replace(/["']?\)$/, "");
+  let drawn = new WeakMap();
+  return (canvas, t) => {
+    const number = nearestInTime(tiles.t_s, t), { width, height, columns } = tiles;
+    if (image.complete && image.naturalWidth && drawn.get(canvas) !== number) {
+      canvas.width = width;
+      canvas.height = height;
+      canvas.getContext("2d").drawImage(image, width * (number % columns), height * Math.floor(number / columns), width, height, 0, 0, width, height);
+      drawn.set(canvas, number);
+    }
+    return tiles.t_s[number];
+  };
+}
+
+/** The story of a town's section, read once from the data in it. */
+const stories = new Map();
+function storyOf(section) {
+  if (!stories.has(section)) {
+    const own = section.querySelector(".player > script"), data = JSON.parse(section.querySelector(".map script").textContent);
+    stories.set(section, makeStory(data, own ? JSON.parse(own.textContent) : null));
+  }
+  return stories.get(section);
+}
+
+function startPlayer(root) {
+  const find = (name) => root.querySelector(name), section = root.closest("section"), style = getComputedStyle(section);
+  const story = storyOf(section), data = story.data;
+  const scene = makeScene(find(".scene"), story), chart = makeChart(find(".chart canvas"), story), slider = find(".chart");
+  const films = [["--sheet", data.thumbnails], ["--sheet2", story.second && story.second.frames]]
+    .map(([key, tiles]) => tiles && style.getPropertyValue(key) ? makeFilm(style.getPropertyValue(key), tiles) : null);
+  const brain = find(".brain") ? makeBrain(find(".brain")) : null, strip = section.querySelector(".traces canvas");
+  const traces = strip ? makeTraces(strip) : null;
+  let name = story.choices.at(-1) || null, segments = [], s = 0, playing = false, last = null, waiting = false;
+
+  const length = () => (segments.length ? segments.at(-1).s1 : 1);
+
+  function choose(other) {
+    const share = s / length();
+    name = other;
+    segments = makeSegments(story, name);
+    chart.tell(segments, name);
+    s = share * length();
+    redraw();
+  }
+
+  function redraw() {
+    if (!waiting) { waiting = true; requestAnimationFrame(frame); }
+  }
+
+  function frame(now) {
+    waiting = false;
+    if (playing) {
+      if (last !== null) s += (Math.min(now - last, 100) / 1000) * (length() / FULL_STORY_S) * Number(find(".speed").value);
+      last = now;
+      if (s >= length()) { s = length(); play(false); }
+      if (!root.offsetParent) play(false); // another town is shown
+    }
+    show();
+    if (playing) redraw();
+  }
+
+  function show() {
+    if (!segments.length || !root.offsetParent) return;
+    const moment = momentAt(segments, s);
+    scene.draw(moment, name);
+    chart.draw(s);
+    const drive = secondDrive(story, name), second = partOf(moment.kind) === "find";
+    if (traces && drive && drive.grid_rad && drive.grid_rad[0].length) traces.draw(drive, second ? moment.t : drive.t_s[0]);
+    const told = tell(moment);
+    slider.setAttribute("aria-valuenow", Math.round((1000 * s) / length()));
+    slider.setAttribute("aria-valuetext", told.join(". "));
+    find(".moment strong").textContent = told[0];
+    find(".moment span").textContent = told.slice(1).join(" · ");
+    for (const button of root.querySelectorAll("[data-part]")) button.setAttribute("aria-pressed", button.dataset.part === partOf(moment.kind));
+  }
+
+  const partOf = (kind) => (kind === "follow" ? "find" : kind);
+
+  /** Show frame, view and networks of a moment, and put it into words. */
+  function tell({ kind, t }) {
+    const second = kind === "find" || kind === "follow", film = films[second ? 1 : 0];
+    root.dataset.part = partOf(kind);
+    find(".film").hidden = kind === "roads" || !film;
+    if (film && kind !== "roads") caption(".film", film(find(".film canvas"), t), second ? "second drive" : "first drive");
+    if (kind === "map") {
+      const i = story.semi ? before(story.semi.t_s, t) : -1;
+      return [`Mapping, ${t.toFixed(0)} s`, i < 0 ? "no semi-metric map" : `the semi-metric map is ${metres(story.semi.error_m[i])} off here`];
+    }
+    if (kind === "roads") return ["The map comes right", `every vertex is laid on the roads: ${name}`];
+    const drive = secondDrive(story, name), i = before(drive.t_s, t), elapsed = t - drive.t_s[0];
+    const known = drive.status ? STATUS[drive.status[i]] : drive.localized[i] ? "localized" : "not localized";
+    showBelief(drive, i);
+    const spread = drive.covariance_m2 && drive.covariance_m2[i] && drive.localized[i] ? `, 95 % sure within ${metres(ellipseOf(drive.covariance_m2[i]).a)}` : "";
+    return [`Second drive, ${elapsed.toFixed(1)} s`, `${known}${spread}`, drive.localized[i] ? `truly ${metres(drive.error_m[i])} off` : `its guess is ${metres(drive.error_m[i])} off`];
+  }
+
+  function showBelief(drive, i) {
+    const view = find(".fired"), view_s = drive.view_s ? drive.view_s[i] : null;
+    view.hidden = view_s === null || !films[0];
+    if (!view.hidden) caption(".fired", films[0](view.querySelector("canvas"), view_s), `view of ${view_s.toFixed(0)} s fired; frame of`);
+    if (brain && drive.grid_rad && drive.grid_rad[i].length) brain(drive, i);
+  }
+
+  function caption(figure, t, words) {
+    find(`${figure} figcaption`).textContent = `${words}, ${t.toFixed(0)} s`.replace("of, ", "of ");
+  }
+
+  function play(on) {
+    playing = on && segments.length > 0;
+    last = null;
+    if (playing && s >= length()) s = 0;
+    find(".play").textContent = playing ? "❚❚ Pause" : "▶ Play";
+    find(".play").setAttribute("aria-pressed", playing);
+    redraw();
+  }
+
+  function seek(to) {
+    play(false);
+    s = Math.min(length(), Math.max(0, to));
+    redraw();
+  }
+
+  function forget() {
+    find(".mark.ramp").style.background = `linear-gradient(90deg, ${ramp().join(",")})`;
+    for (const one of [scene, chart, traces]) if (one) one.forget();
+    redraw();
+  }
+
+  function setUp() {
+    const select = find(".choice");
+    for (const choice of story.choices) select.append(make("option", choice, { value: choice, selected: choice === name }));
+    if (story.semi) find(".mark.own").style.background = story.colours[story.semi.name];
+    select.closest("label").hidden = story.choices.length < 2;
+    select.addEventListener("change", () => choose(select.value));
+    find(".play").addEventListener("click", () => play(!playing));
+    for (const button of root.querySelectorAll("[data-part]")) button.addEventListener("click", () => {
+      const part = segments.find((one) => one.kind === button.dataset.part) || segments.find((one) => partOf(one.kind) === button.dataset.part);
+      if (part) { s = part.s0; play(!still.matches); }
+    });
+    slider.addEventListener("pointerdown", (event) => { slider.setPointerCapture(event.pointerId); seek(chart.at(event.clientX)); });
+    slider.addEventListener("pointermove", (event) => { if (event.buttons) seek(chart.at(event.clientX)); });
+    root.addEventListener("keydown", (event) => {
+      if (event.target.matches("select")) return;
+      if (event.key === " " && !event.target.matches("button")) { event.preventDefault(); return play(!playing); }
+      if (!slider.contains(event.target) || !(event.key in KEYS)) return;
+      event.preventDefault();
+      seek(s + KEYS[event.key] * length());
+    });
+    if (strip) strip.addEventListener("pointerdown", (event) => seek(storyTime(segments, 2, traces.at(event.clientX))));
+    new ResizeObserver(forget).observe(root);
+    dark.addEventListener("change", forget);
+  }
+
+  setUp();
+  choose(name);
+  setTimeout(redraw, 200); // by then the frames are decoded
+  root.dataset.ready = "yes";
+  /** Show a time of one of the two drives, and play or not. */
+  return {
+    at(drive, t) { seek(storyTime(segments, drive, t)); },
+    play,
+    begin() { if (!still.matches) { s = 0; play(true); } else seek(0.3 * length()); },
+  };
+}

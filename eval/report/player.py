@@ -1,0 +1,140 @@
+"""The first screen of a town: the drive playing, in markup that ``player.js`` brings to life."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hippodrome.eval.report.files import ScenarioFiles
+from hippodrome.eval.report.markup import Html, data_script, element, joined
+from hippodrome.eval.report.tables import anchor
+from hippodrome.eval.results.model import Results, ScenarioResult
+
+SPEEDS = (("0.25", "¼ speed"), ("0.5", "½ speed"), ("1", "1× speed"), ("2", "2× speed"), ("4", "4× speed"))
+PARTS = (("map", "1 The map grows"), ("roads", "2 It comes right"), ("find", "3 The car finds itself"))
+MARKS = (  # sign, meaning, and the parts of the story in which it is seen
+    ("truth", "true path", "map roads find"),
+    ("own", "semi-metric map", "map roads"),
+    ("ramp", "on the roads: error 0.1 to 100 m", "roads"),
+    ("fix", "belief (95 %)", "find"),
+    ("view", "view that fired", "find"),
+)
+BRAIN_PARTS = (  # equations are those of Li et al. 2025
+    ("Head-direction ring:", "each cell stands for a heading, and the cells around the believed one are active, Eq. (1)."),
+    ("Grid sheets:", "each cell stands for a place within a period that repeats over the town, Eq. (2); modules of unequal "
+                     "periods together tell one place, the arrow on the map, Eqs. (15) and (16)."),
+    ("Integrator cells (blue):", "move the bump by what wheels and gyro say, and slowly lose certainty."),
+    ("Calibration cells (orange):", "take the pose of a recognised view in, an injection, Eqs. (13) and (14)."),
+    ("Inhibition:", "keeps the activity of a network limited, Eqs. (3) to (5), and lets its two populations compete, "
+                    "Eqs. (6) and (7)."),
+)  # fmt: skip
+MODULES = 3  # sheets that there is room for; a belief with fewer hides the others
+
+
+def player(files: ScenarioFiles) -> Html | None:
+    """The player of one town; None without ``map.json``. It reads the map that stands further down in the same section."""
+    if files.evidence is None:
+        return None
+    return element(
+        "div",
+        data_script(files.second) if files.second else None,
+        element("div", element("canvas", class_="scene", role="img", aria_label="The town with the drive and its maps"),
+                _moment(), _legend(), class_="stage-map"),
+        _seen(files),
+        element("div", element("canvas", aria_hidden="true"), class_="chart", tabindex="0", role="slider",
+                aria_valuemin=0, aria_valuemax=1000, aria_valuenow=0,
+                aria_label="Place in the story; the curves are the errors in metres"),
+        _transport(),
+        class_="player", role="region", aria_label="The drive, playing",
+    )  # fmt: skip
+
+
+def brain_at_work(files: ScenarioFiles) -> Html | None:
+    """How sure the networks were along the second drive, and one sentence for each part of them; None without a belief."""
+    if files.second is None or not any(any(one.grid_rad) for one in files.second.beliefs):
+        return None
+    canvas = element("canvas", role="img", aria_label="Reliability of both populations of both networks along the second drive")
+    parts = [element("li", element("strong", name), f" {words}") for name, words in BRAIN_PARTS]
+    return joined(element("div", canvas, class_="traces"), element("ul", parts, class_="facts"))
+
+
+def towns(results: Results, found: Sequence[ScenarioFiles]) -> Html | None:
+    """A card for each scenario that has a map, which tell their stories at the same time; None if none has."""
+    cards = [
+        _card(place, scenario)
+        for place, (scenario, files) in enumerate(zip(results.scenarios, found, strict=True))
+        if files.evidence is not None
+    ]
+    if not cards:
+        return None
+    button = element("button", "▶ Play all", type="button", class_="play-all", aria_pressed="false")
+    return element("div", element("div", cards, class_="town-cards"), element("div", button, class_="transport"), class_="towns")
+
+
+def _card(place: int, scenario: ScenarioResult) -> Html:
+    """A town with the figures of its last row that has a map, which is what a run is about."""
+    best = next((row for row in reversed(scenario.rows) if row.ape is not None), None)
+    words = f"{best.method}: {best.ape.mean_m:.2f} m off in the mean" if best and best.ape else "no map"
+    if best is not None and best.refused is not None:
+        words = f"{best.method}: refused"
+    where = best.localization if best else None
+    found = (
+        ""
+        if where is None
+        else f"localized after {where.initial_drive_s:.1f} s"
+        if where.initial_drive_s is not None
+        else "never localized"
+    )
+    canvas = element("canvas", role="img", aria_label=f"{scenario.name}: the story of its map")
+    return element("a", element("span", canvas, class_="stage-map"), element("strong", scenario.name), element("small", ""),
+                   element("span", words), element("span", found),
+                   href=f"#{anchor(place)}", class_="town", data_place=anchor(place))  # fmt: skip
+
+
+def _moment() -> Html:
+    return element("p", element("strong", ""), element("span", ""), class_="moment")
+
+
+def _legend() -> Html:
+    """What the marks mean; the colours are those of the map's layers."""
+    items = [element("li", element("i", class_=f"mark {kind}"), words, data_in=parts) for kind, words, parts in MARKS]
+    return element("ul", items, class_="legend")
+
+
+def _seen(files: ScenarioFiles) -> Html:
+    pictures = [_picture("film", "Camera frame"), _picture("fired", "The stored view that fired")] if files.thumbnails else []
+    return element("div", element("div", pictures, class_="frames"), _brain() if files.second else None, class_="seen")
+
+
+def _picture(kind: str, label: str) -> Html:
+    return element(
+        "figure", element("canvas", role="img", aria_label=label, width=160, height=120), element("figcaption", ""), class_=kind
+    )
+
+
+def _brain() -> Html:
+    """The networks, with one sentence for each."""
+    sheets = [
+        element("figure", element("canvas", class_="sheet", role="img", aria_label=f"Grid cells, module {number}"),
+                element("figcaption", f"grid {number}"))
+        for number in range(1, MODULES + 1)
+    ]  # fmt: skip
+    ring = element(
+        "figure", element("canvas", class_="ring", role="img", aria_label="Head-direction ring"), element("figcaption", "heading")
+    )
+    colours = element("p", element("b", "integrator", class_="integrator"), " cells follow wheels and gyro, ",
+                      element("b", "calibration", class_="calibration"), " cells the views; both on a log scale. ",
+                      "Black is silent, and a dim network knows nothing.")  # fmt: skip
+    return element("div", element("div", ring, sheets, class_="networks"), colours, class_="brain")
+
+
+def _transport() -> Html:
+    parts = [element("button", words, type="button", data_part=kind, aria_pressed="false") for kind, words in PARTS]
+    speeds = [element("option", words, value=value, selected=value == "1") for value, words in SPEEDS]
+    return element(
+        "div",
+        element("button", "▶ Play", type="button", class_="play", aria_pressed="false"),
+        parts,
+        element("select", speeds, class_="speed", aria_label="Speed"),
+        element("label", "Map ", element("select", class_="choice")),
+        class_="transport",
+    )

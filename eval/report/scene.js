@@ -1,0 +1,198 @@
+// The player's map: one moment of a story, drawn. Roads and truth are drawn once per view and copied afterwards.
+
+const HEAD_PX = 62, FOOT_PX = 24; // above and below a large map, for its words and its legend
+const ANYWHERE_M = 150; // half axis of a belief that covers a town: drawn as a veil over all of it
+
+function storyBounds(story) {
+  const paths = [story.data.truth, story.semi, ...story.refined].filter((path) => path && path.t_s.length);
+  const all = (key, pick) => paths.reduce((worst, path) => path[key].reduce((a, b) => pick(a, b), worst), pick === Math.min ? Infinity : -Infinity);
+  return paths.length ? [all("x_m", Math.min), all("y_m", Math.min), all("x_m", Math.max), all("y_m", Math.max)] : [0, 0, 1, 1];
+}
+
+function makeScene(canvas, story) {
+  const pen = canvas.getContext("2d"), still = document.createElement("canvas"), bounds = storyBounds(story);
+  let view = null, inks = null;
+  const X = (x) => view.x + view.scale * x, Y = (y) => view.y - view.scale * y;
+
+  function resize() {
+    const w = canvas.clientWidth, h = canvas.clientHeight, ratio = window.devicePixelRatio || 1;
+    if (!w || !h) return (view = null);
+    const [x0, y0, x1, y1] = bounds, [head, foot] = canvas.matches(".scene") ? [HEAD_PX, FOOT_PX] : [0, 0], room = h - head - foot;
+    const scale = 0.9 * Math.min(w / Math.max(x1 - x0, 1), room / Math.max(y1 - y0, 1));
+    view = { w, h, ratio, scale, x: w / 2 - scale * (x0 + x1) / 2, y: head + room / 2 + scale * (y0 + y1) / 2 };
+    const style = getComputedStyle(canvas);
+    inks = Object.fromEntries(["road", "truth", "soft", "accent", "bad", "good", "paper", "ink"].map((key) => [key, style.getPropertyValue(`--${key}`).trim()]));
+    for (const one of [canvas, still]) { one.width = Math.round(w * ratio); one.height = Math.round(h * ratio); }
+    drawStill(still.getContext("2d"));
+    return view;
+  }
+
+  function drawStill(on) {
+    on.setTransform(view.ratio, 0, 0, view.ratio, 0, 0);
+    on.lineJoin = on.lineCap = "round";
+    on.strokeStyle = inks.road;
+    on.lineWidth = Math.min(Math.max(2.6 * view.scale, 1), 6);
+    on.beginPath();
+    for (const road of story.data.roads) for (let i = 0; i < road.length; i += 2) on[i ? "lineTo" : "moveTo"](X(road[i]), Y(road[i + 1]));
+    on.stroke();
+  }
+
+  /** The path up to a time, as a line. */
+  function trail(path, t, colour, width, from = -Infinity) {
+    pen.strokeStyle = colour;
+    pen.lineWidth = width;
+    pen.beginPath();
+    let begun = false;
+    for (let i = 0; i < path.t_s.length && path.t_s[i] <= t; i++) {
+      if (path.t_s[i] < from) continue;
+      pen[begun ? "lineTo" : "moveTo"](X(path.x_m[i]), Y(path.y_m[i]));
+      begun = true;
+    }
+    pen.stroke();
+  }
+
+  /** Vertices as dots; place(i) gives where, colour(i) its colour. Dots of one colour are filled together. */
+  function dots(count, place, colour, size) {
+    const groups = new Map();
+    for (let i = 0; i < count; i++) {
+      const key = colour(i);
+      if (!groups.has(key)) groups.set(key, []);
+      groups.get(key).push(i);
+    }
+    for (const [key, members] of groups) {
+      pen.fillStyle = key;
+      pen.beginPath();
+      for (const i of members) {
+        const [x, y] = place(i);
+        pen.moveTo(X(x) + size, Y(y));
+        pen.arc(X(x), Y(y), size, 0, 2 * Math.PI);
+      }
+      pen.fill();
+    }
+  }
+
+  function disc(x, y, size, fill, edge) {
+    pen.beginPath();
+    pen.arc(X(x), Y(y), size, 0, 2 * Math.PI);
+    pen.fillStyle = fill;
+    pen.fill();
+    pen.lineWidth = 2;
+    pen.strokeStyle = edge;
+    pen.stroke();
+  }
+
+  function link(from, to, colour) {
+    pen.strokeStyle = colour;
+    pen.lineWidth = 1.4;
+    pen.setLineDash([4, 3]);
+    pen.beginPath();
+    pen.moveTo(X(from[0]), Y(from[1]));
+    pen.lineTo(X(to[0]), Y(to[1]));
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+
+  const dotSize = () => Math.min(Math.max(1.3 * view.scale, 1.7), 4);
+
+  /** The first drive: the semi-metric map grows from its vertices, beside where the car truly is. */
+  function drawMapping(t) {
+    const { data, semi } = story;
+    trail(data.truth, t, inks.truth, 1.6);
+    const now = placeAt(data.truth, t);
+    if (semi && semi.t_s.length && semi.t_s[0] <= t) {
+      dots(before(semi.t_s, t) + 1, (i) => [semi.x_m[i], semi.y_m[i]], () => story.colours[semi.name], dotSize());
+      const mapped = placeAt(semi, t);
+      link(mapped, now, inks.bad);
+      disc(...mapped, 5, story.colours[semi.name], inks.paper);
+    }
+    disc(...now, 5, inks.truth, inks.paper);
+  }
+
+  /** The map comes right: every vertex moves from its semi-metric place to its place on the roads, the first ones first. */
+  function drawRoads(share, layer) {
+    const { semi } = story, moving = semi && semi.t_s.length === layer.t_s.length, count = layer.t_s.length;
+    trail(story.data.truth, Infinity, inks.truth, 1);
+    const eased = (i) => { const u = Math.min(1, Math.max(0, 1.8 * share - 0.8 * i / count)); return u * u * (3 - 2 * u); };
+    const place = (i) => {
+      const u = moving ? eased(i) : 1, from = moving ? semi : layer;
+      return [from.x_m[i] + u * (layer.x_m[i] - from.x_m[i]), from.y_m[i] + u * (layer.y_m[i] - from.y_m[i])];
+    };
+    dots(count, place, (i) => (!moving || eased(i) > 0.97) && layer.error_m[i] !== null ? errorColour(layer.error_m[i]) : story.colours[moving ? semi.name : layer.name], dotSize());
+  }
+
+  function drawVeil(colour, strength) {
+    pen.globalAlpha = strength;
+    pen.fillStyle = colour;
+    pen.fillRect(0, 0, view.w, view.h);
+    pen.globalAlpha = 1;
+  }
+
+  /** The second drive in the finished map: the belief with its ellipse, from anywhere to the fix. */
+  function drawSecond(t, layer, drive) {
+    dots(layer.t_s.length, (i) => [layer.x_m[i], layer.y_m[i]], () => inks.soft, 0.6 * dotSize());
+    const i = before(drive.t_s, t), known = drive.localized[i], colour = known ? inks.good : inks.bad;
+    const truth = story.second && story.second.truth;
+    if (truth && truth.t_s.length) trail(truth, t, inks.truth, 1.8);
+    const first = drive.localized.indexOf(true);
+    if (first >= 0 && drive.t_s[first] <= t) trail(drive, t, story.colours[layer.name], 3, drive.t_s[first]);
+    const stated = drive.covariance_m2 && drive.covariance_m2[i], spread = stated && ellipseOf(stated);
+    if (!known && (!spread || spread.a > ANYWHERE_M)) drawVeil(colour, 0.13);
+    else if (spread) drawEllipse([drive.x_m[i], drive.y_m[i]], spread, colour);
+    const view_m = drive.view_m && drive.view_m[i];
+    if (view_m) {
+      pen.strokeStyle = inks.accent;
+      pen.lineWidth = 2;
+      pen.strokeRect(X(view_m[0]) - 6, Y(view_m[1]) - 6, 12, 12);
+    }
+    if (truth && truth.t_s.length) disc(...placeAt(truth, t), 5, inks.truth, inks.paper);
+    if (known) arrow(drive, i, placeAt(drive, t), colour);
+  }
+
+  function drawEllipse([x, y], { a, b, turn }, colour) {
+    const least = 7; // pixels: a belief of half a metre would not be seen
+    pen.beginPath();
+    pen.ellipse(X(x), Y(y), Math.max(a * view.scale, least), Math.max(b * view.scale, least), -turn, 0, 2 * Math.PI);
+    pen.globalAlpha = 0.25;
+    pen.fillStyle = colour;
+    pen.fill();
+    pen.globalAlpha = 1;
+    pen.strokeStyle = colour;
+    pen.lineWidth = 2;
+    pen.stroke();
+  }
+
+  function arrow(drive, i, [x, y], colour) {
+    const heading = drive.heading_rad ? drive.heading_rad[i] : null;
+    if (heading === null) return disc(x, y, 5, colour, inks.paper);
+    pen.save();
+    pen.translate(X(x), Y(y));
+    pen.rotate(-heading);
+    pen.beginPath();
+    for (const [along, across] of [[11, 0], [-7, 6], [-3, 0], [-7, -6]]) pen.lineTo(along, across);
+    pen.closePath();
+    pen.fillStyle = colour;
+    pen.fill();
+    pen.lineWidth = 1.5;
+    pen.strokeStyle = inks.paper;
+    pen.stroke();
+    pen.restore();
+  }
+
+  /** Draw the moment of a story told with one of its refined maps. */
+  return {
+    resize,
+    draw(moment, name) {
+      if (!view && !resize()) return;
+      pen.setTransform(1, 0, 0, 1, 0, 0);
+      pen.clearRect(0, 0, canvas.width, canvas.height);
+      pen.drawImage(still, 0, 0);
+      pen.setTransform(view.ratio, 0, 0, view.ratio, 0, 0);
+      pen.lineJoin = "round";
+      const layer = story.refined.find((one) => one.name === name);
+      if (moment.kind === "map") drawMapping(moment.t);
+      else if (moment.kind === "roads") drawRoads(moment.t, layer);
+      else drawSecond(moment.t, layer, secondDrive(story, name));
+    },
+    forget() { view = null; },
+  };
+}

@@ -1,0 +1,51 @@
+// The towns as tabs, and addresses that open a place: #town=NAME&drive=1&t=42, or #scenario-1 for a town.
+
+const panels = [...document.querySelectorAll("section.panel")], links = [...document.querySelectorAll("nav.tabs a")];
+const players = new Map();
+
+function playerOf(panel) {
+  const root = panel.querySelector(".player, .towns");
+  if (root && !players.has(root)) players.set(root, root.matches(".towns") ? startCards(root) : startPlayer(root));
+  return root ? players.get(root) : null;
+}
+
+function openPanel(panel) {
+  for (const one of panels) one.hidden = one !== panel;
+  for (const link of links) {
+    const own = link.hash === `#${panel.id}`;
+    link.setAttribute("aria-selected", own);
+    link.tabIndex = own ? 0 : -1;
+  }
+}
+
+/** Open what the address names; the first panel, or the only town, if it names nothing. */
+function follow(first) {
+  const words = new URLSearchParams(location.hash.slice(1)), town = words.get("town"), t = Number(words.get("t") ?? NaN);
+  const named = panels.find((one) => town !== null ? one.dataset.town === town : `#${one.id}` === location.hash);
+  if (!named && !first) return;
+  const panel = named || (panels.length === 2 ? panels[1] : panels[0]);
+  openPanel(panel);
+  const player = playerOf(panel);
+  if (player && Number.isFinite(t)) player.at(Number(words.get("drive") ?? 1), t);
+  else if (player) player.begin();
+  if (!first || named) window.scrollTo(0, 0);
+}
+
+if (panels.length) {
+  document.querySelector("nav.tabs").setAttribute("role", "tablist");
+  for (const link of links) {
+    link.setAttribute("role", "tab");
+    link.setAttribute("aria-controls", link.hash.slice(1));
+    link.addEventListener("keydown", (event) => {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!step && event.key !== " ") return;
+      event.preventDefault();
+      const next = step ? links[(links.indexOf(link) + step + links.length) % links.length] : link;
+      next.click();
+      next.focus();
+    });
+  }
+  for (const panel of panels) panel.setAttribute("role", "tabpanel");
+  addEventListener("hashchange", () => follow(false));
+  follow(true);
+}

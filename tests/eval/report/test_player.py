@@ -1,0 +1,143 @@
+"""The player in a real browser: every control, addresses that open a place, and data that comes back as it was."""
+
+import json
+import re
+
+import cv2
+import numpy as np
+import pytest
+
+from hippodrome.eval.report.belief import Belief, SecondDrive
+from hippodrome.eval.report.report import write_report
+from hippodrome.eval.results.model import Results, write_results
+from tests.eval.report.test_report import HOSTILE, VERTICES, Page, browse, evidence, needs_browser, scenario
+
+FIX = 6  # sample at which the drive is localized
+CLOCK = "<head><script>window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 1);</script>"
+LIMIT_BYTES = 12_000_000
+
+
+def second_drive():
+    path = evidence().truth.model_dump()
+    known = [step >= FIX for step in range(VERTICES)]
+    belief = Belief(
+        name="topometric", **path, heading_rad=[0.1] * VERTICES,
+        covariance_m2=[(1.0, 0.2, 2.0) if now else (1e6, 0.0, 1e6) for now in known],
+        error_m=[1.5 if now else 80.0 for now in known], localized=known,
+        status=[int(now) for now in known], confidence=[2.0] * VERTICES,
+        view_s=[30.0] * VERTICES, view_m=[(5.0, 6.0)] * VERTICES,
+        head_rad=[[0.1, 0.2]] * VERTICES, head_reliability=[[5.0, 6.0]] * VERTICES,
+        grid_rad=[[0.5] * 12] * VERTICES, grid_reliability=[[float(3 + step)] * 12 for step in range(VERTICES)],
+    )  # fmt: skip
+    tiles = {"t_s": [0.0, 30.0, 60.0], "columns": 2, "width": 16, "height": 12}
+    return SecondDrive.model_validate({"truth": path, "frames": tiles, "beliefs": [belief.model_dump()]})
+
+
+@pytest.fixture
+def report(tmp_path):
+    write_results(tmp_path / "results.json", Results(scenarios=(scenario("town & co"), scenario(HOSTILE))))
+    folder = tmp_path / "town & co"
+    folder.mkdir()
+    for name in ("thumbnails.jpg", "frames-second.jpg"):
+        cv2.imwrite(str(folder / name), np.full((24, 32, 3), 90, np.uint8))
+    (folder / "map.json").write_text(evidence().model_dump_json())
+    (folder / "belief.json").write_text(second_drive().model_dump_json())
+    return write_report(tmp_path)
+
+
+def after(report, folder, script, address=""):
+    """Attributes of the page's body after a script has run in it, and what the console said."""
+    text = report.read_text(encoding="utf-8").replace("<head>", CLOCK)
+    run = f"""<script>addEventListener("load", () => setTimeout(async () => {{
+        const panel = document.querySelector(".panel:not([hidden])");
+        const wait = () => new Promise((done) => setTimeout(done, 150));
+        const say = (key, value) => {{ document.body.dataset[key] = value; }};
+        await wait(); {script} }}, 200));</script></body>"""
+    hashed = f"<script>location.hash = {json.dumps(address)};</script>" if address else ""
+    copy = folder / "copy.html"
+    copy.write_text(text.replace("<body>", f"<body>{hashed}").replace("</body>", run), encoding="utf-8")
+    dom, console = browse(copy, folder)
+    return Page(dom).all("body")[0], console
+
+
+def test_the_data_comes_back_as_it_was(report):
+    page = Page(report.read_text(encoding="utf-8"))
+    found = [json.loads(text) for parent, text in page.texts if parent == "script" and text.startswith('{"')]
+    assert [SecondDrive.model_validate(one) for one in found if "beliefs" in one] == [second_drive()]
+    assert report.stat().st_size < LIMIT_BYTES
+
+
+def test_no_script_makes_markup_of_data(report):
+    scripts = "".join(text for parent, text in Page(report.read_text(encoding="utf-8")).texts if parent == "script")
+    assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function", scripts)
+
+
+@needs_browser
+def test_an_address_opens_a_time_of_the_second_drive(report, tmp_path):
+    script = """say("town", panel.dataset.town); say("words", panel.querySelector(".moment").textContent);
+        say("part", panel.querySelector(".player").dataset.part);
+        say("fired", panel.querySelector(".fired figcaption").textContent);"""
+    body, console = after(report, tmp_path, script, "town=town%20%26%20co&drive=2&t=40")
+    assert console == []
+    assert (body["data-town"], body["data-part"]) == ("town & co", "find")
+    half_axis_m = 2.4477 * np.sqrt(np.linalg.eigvalsh([[1.0, 0.2], [0.2, 2.0]])[-1])
+    assert "Second drive, 40.0 s" in body["data-words"] and f"95 % sure within {half_axis_m:.2f} m" in body["data-words"]
+    assert "truly 1.50 m off" in body["data-words"]
+    assert body["data-fired"] == "view of 30 s fired; frame of 30 s"
+
+
+@needs_browser
+def test_every_control_moves_the_story(report, tmp_path):
+    script = """const player = panel.querySelector(".player"), chart = player.querySelector(".chart");
+        const at = () => Number(chart.getAttribute("aria-valuenow"));
+        const press = async (key) => {
+            chart.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true })); await wait(); return at(); };
+        const play = player.querySelector(".play");
+        if (play.getAttribute("aria-pressed") === "true") play.click();
+        say("keys", [await press("Home"), await press("PageUp"), await press("ArrowLeft"), await press("End")].join(" "));
+        for (const button of player.querySelectorAll("[data-part]")) {
+            button.click(); await wait(); play.click(); await wait(); say(button.dataset.part, player.dataset.part); }
+        await press("Home"); player.querySelector(".speed").value = "4"; play.click(); await wait(); await wait();
+        say("moved", at() > 0);
+        await press(" "); say("paused", play.getAttribute("aria-pressed"));"""
+    body, console = after(report, tmp_path, script, "scenario-1")
+    assert console == []
+    assert body["data-keys"] == "0 50 45 1000"
+    assert [body[f"data-{part}"] for part in ("map", "roads", "find")] == ["map", "roads", "find"]
+    assert (body["data-moved"], body["data-paused"]) == ("true", "false")
+
+
+@needs_browser
+def test_the_first_tab_compares_and_tabs_go_by_keyboard(report, tmp_path):
+    script = """say("first", panel.id); const tabs = [...document.querySelectorAll("[role=tab]")];
+        tabs[0].dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true })); await wait();
+        say("next", document.querySelector(".panel:not([hidden])").id);
+        say("selected", tabs.map((tab) => tab.ariaSelected).join(" "));
+        say("cards", document.querySelectorAll(".town").length);"""
+    body, console = after(report, tmp_path, script)
+    assert console == []
+    assert (body["data-first"], body["data-next"], body["data-cards"]) == ("compare", "scenario-1", "1")
+    assert body["data-selected"] == "false true false"
+
+
+@needs_browser
+def test_tables_sort_filter_and_are_written_in_four_formats(report, tmp_path):
+    script = """const box = panel.querySelector('[aria-label$=": mapping"]'), table = box.querySelector("table");
+        const names = () => [...table.tBodies[0].rows].filter((row) => !row.hidden).map((row) => textOf(row.cells[0])).join("|");
+        table.querySelectorAll(".sort")[1].click(); say("sorted", names());
+        say("best", [...table.querySelectorAll("td.best")].map(textOf)[0]);
+        const filter = box.nextElementSibling.querySelector("input"); filter.value = "dead";
+        filter.dispatchEvent(new Event("input"));
+        say("filtered", names()); say("width", document.documentElement.scrollWidth - innerWidth);
+        const cells = [["a", "b (m)"], [["x|y_1", "<0.1"], ['=1+1', '-2']]];
+        say("csv", asCsv(...cells)); say("json", asJson(...cells)); say("latex", asLatex(...cells));
+        say("markdown", asMarkdown(...cells));"""
+    body, console = after(report, tmp_path, script, "scenario-1")
+    assert console == []
+    assert body["data-sorted"].split("|")[0] == "topometric" and body["data-best"] == "0.50"
+    assert body["data-filtered"] == "dead reckoning"
+    assert body["data-csv"].splitlines() == ['"a","b (m)"', '"x|y_1","<0.1"', '"\'=1+1","-2"']
+    assert json.loads(body["data-json"]) == [{"a": "x|y_1", "b (m)": "<0.1"}, {"a": "=1+1", "b (m)": "-2"}]
+    assert r"x|y\_1 & $<$0.1 \\" in body["data-latex"]
+    assert r"| x\|y_1 | <0.1 |" in body["data-markdown"]
+    assert int(body["data-width"]) <= 0

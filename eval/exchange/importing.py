@@ -36,6 +36,7 @@ from hippodrome.eval.exchange.readers.layouts import recognised
 from hippodrome.eval.exchange.readers.pictures import read_image_folder, read_video
 from hippodrome.eval.exchange.readers.self_motion import read_bare_odometry, read_self_motion
 from hippodrome.eval.exchange.readers.tables import is_kitti_poses, read_poses
+from hippodrome.eval.methods.beforehand import UNITS
 
 # Layout -> module below ``readers`` and its function, which takes the source and the axes of its poses.
 READERS: Final = {
@@ -75,6 +76,7 @@ class ImportOptions:
     camera_ahead: Ahead = "auto"  # how far ahead of the rear axle the poses of ``odometry`` lie, in their unit
     topics: tuple[str, ...] = ()  # those of a log that are used; the others are chosen by their names and types
     truth_ahead: Ahead | None = None  # the same of the truth's poses; None: as ``camera_ahead``
+    metres_per_unit: float | None = None  # length of the self-motion's unit; None: unknown
 
 
 def import_drive(options: ImportOptions) -> None:
@@ -122,6 +124,7 @@ def import_drive(options: ImportOptions) -> None:
             "camera": camera_record(samples, (width, height), fov_deg),
             "truth_share": round(truth_share, 6),
             "truth_frame": "network" if known is not None and known.in_network else options.truth_frame,
+            **({} if options.metres_per_unit is None else {UNITS: options.metres_per_unit}),
         }
         seal(building, content, samples)
     pictures = f"{len(frames)} frames of {width} x {height}" if frames else "no frames"

@@ -18,6 +18,7 @@ import numpy as np
 from hippodrome._files import sha256_of, write_atomically
 from hippodrome.core.types import CognitiveMap, HippodromeError, MatchBreak, MatchStatus, Refinement, StartPose
 from hippodrome.eval.exchange.drives.exported import truth_of
+from hippodrome.eval.methods.beforehand import Beforehand
 from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.eval.methods.stages import map_files, network_file, read_roads, refine_files
 from hippodrome.eval.real.page import Drive, drive_page
@@ -42,6 +43,7 @@ class RunOptions:
     network: Path  # SUMO, OpenStreetMap or OpenDRIVE
     out: Path
     start: StartPose | GeoStart | None
+    known: Beforehand  # unit of the odometry, accuracy of the network
     import_to: Callable[[Path, Path], object] | None  # (recording to be made, SUMO network); None: ``drive`` is a recording
     score: Callable[[Path, Path], object]  # prints the errors of a map against a recording's truth
     asked: Mapping[str, str]
@@ -120,17 +122,21 @@ def run_drive(options: RunOptions) -> None:
 
 
 def _check_same(out: Path, asked: Mapping[str, str]) -> None:
-    """Raises HippodromeError if the folder holds results that were asked for otherwise, or is not ours."""
+    """Raises HippodromeError if the folder holds results that were asked for otherwise, or is not ours.
+
+    A run that ended before it had any result, as its options were wrong, may be told others.
+    """
     if not out.exists() or not any(out.iterdir()):
         return
     if not (out / RECORD).exists() and not (out / RECORDING).exists():
         raise HippodromeError(f"{out}: holds other files than a run's; choose a new --out")
+    imported = (out / RECORDING / MANIFEST).exists()
+    if not imported and not (out / SEMI_METRIC).exists():
+        return
     before = _record_of(out).get("asked", asked)
     if differing := sorted(name for name in {*before, *asked} if before.get(name) != asked.get(name)):
-        raise HippodromeError(
-            f"{out}: was made with another {', '.join(differing)}; choose a new --out (the drive is imported already: give "
-            f"{out / RECORDING} as DRIVE)"
-        )
+        hint = f" (the drive is imported already: give {out / RECORDING} as DRIVE)" if imported else ""
+        raise HippodromeError(f"{out}: was made with another {', '.join(differing)}; choose a new --out{hint}")
 
 
 def _record_of(out: Path) -> dict[str, Any]:
@@ -169,7 +175,8 @@ def _silently(work: Callable[[], ResultT]) -> ResultT:
 
 
 def _refine(options: RunOptions, net_file: Path, topometric: Path) -> None:
-    refinement: Refinement = refine_files(options.out / SEMI_METRIC, net_file, "route", options.start, None, topometric)
+    semi_metric = options.out / SEMI_METRIC
+    refinement: Refinement = refine_files(semi_metric, net_file, "route", options.start, None, topometric, options.known)
     breaks = [
         {"first": one.first_vertex, "last": one.last_vertex, "status": one.status.name, "cause": one.cause}
         for one in refinement.breaks

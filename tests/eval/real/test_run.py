@@ -13,6 +13,7 @@ import pytest
 from hippodrome.core import se2
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
+from hippodrome.proto.codec import load_map
 from tests.sim.test_map_import import BLOCK
 
 REAL = Path(__file__).parents[3].parent / "shared" / "real" / "kitti-03"
@@ -95,6 +96,39 @@ def test_results_of_another_map_are_not_mixed_in(drive, finished, tmp_path, caps
     assert "was made with another MAP; choose a new --out" in capsys.readouterr().err
     assert main(["run", str(drive[0]), "--network", str(drive[1]), "--start", "1,2,3", "--out", str(finished)]) == BAD_INPUT
     assert "another --start" in capsys.readouterr().err
+
+
+def test_options_of_the_import_are_no_options_of_a_recording(drive, tmp_path, capsys):
+    arguments = ["run", str(drive[0]), "--network", str(drive[1]), "--out", str(tmp_path / "out")]
+    assert main([*arguments, "--fps", "10", "--truth", "gps.gpx"]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "is a recording already, and --fps, --truth would say how to make one" in said and "`hippodrome score`" in said
+
+
+def test_a_run_that_was_told_the_wrong_options_takes_the_right_ones_afterwards(drive, tmp_path, capsys):
+    poses = tmp_path / "poses.txt"
+    turned = np.radians(90.0) * np.clip((np.arange(160) - 100) / 12.0, 0.0, 1.0)
+    x, z = np.cumsum(np.sin(turned)), np.cumsum(np.cos(turned))
+    rows = zip(np.cos(turned), np.sin(turned), x, z, strict=True)
+    poses.write_text("".join(f"{c} 0 {s} {x} 0 1 0 0 {-s} 0 {c} {z}\n" for c, s, x, z in rows))
+    arguments = ["run", str(poses), "--network", str(drive[1]), "--out", str(tmp_path / "out")]
+    assert main(arguments) == BAD_INPUT and "--fps N" in capsys.readouterr().err
+    assert main([*arguments, "--fps", "10", "--units", "metres"]) == DONE
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["asked"].keys() == {"--fps", "--units", "MAP", "DRIVE"}
+    assert main([*arguments, "--fps", "5"]) == BAD_INPUT
+    assert "another --fps, --units; choose a new --out (the drive is imported already" in capsys.readouterr().err
+
+
+def test_the_unit_said_at_import_reaches_the_refinement(tmp_path, drive, capsys):
+    write_drive(tmp_path / "tum")
+    recording, semi, topo = (str(tmp_path / name) for name in ("recording", "semi.pbstream", "topo.pbstream"))
+    assert main(["import", str(tmp_path / "tum"), "--units", "metres", "--out", recording]) == DONE
+    assert main(["map", recording, "--out", semi]) == DONE
+    capsys.readouterr()
+    assert main(["refine", semi, "--network", str(drive[1]), "--network-accuracy", "1", "--out", topo]) == DONE
+    assert "unit of the odometry: 1 m, as was said when the drive was imported" in capsys.readouterr().out
+    provenance = load_map(Path(topo))[1]
+    assert "metres_per_unit=1.0" in provenance["refine"] and "survey_sigma_m=1.0" in provenance["refine"]
 
 
 def test_a_folder_of_other_things_is_left_alone(drive, tmp_path, capsys):

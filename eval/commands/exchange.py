@@ -120,6 +120,11 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     _add_truth(into, "the layout's own, if any")
     into.add_argument(
+        "--truth-offset", type=_offset, default=0.0, metavar="S", dest="truth_offset_s",
+        help="seconds to add to the times of the truth, to lay its clock on the drive's (a video begins at 0, a GPX file has the "
+             "date); auto: told by the turns of both; refused where that is not sure (default: 0)",
+    )  # fmt: skip
+    into.add_argument(
         "--axes", choices=["body", "camera"],
         help="which way poses point: body: x forward, z up; camera: z forward, y down (default: body; for kitti, camera)",
     )  # fmt: skip
@@ -284,7 +289,8 @@ def import_command(options: argparse.Namespace) -> int:
             network=options.network, truth_sigma_m=options.truth_sigma, axes=options.axes, truth_frame=options.truth_frame,
             size_px=options.size, fps=options.fps, time_unit=options.time_unit, time_offset_s=options.time_offset_s,
             calibration=options.calibration, camera_height_m=options.camera_height_m, camera_ahead=options.camera_ahead,
-            truth_ahead=options.truth_ahead, topics=tuple(options.topics), metres_per_unit=options.metres_per_unit,
+            truth_ahead=options.truth_ahead, topics=tuple(options.topics), truth_offset_s=options.truth_offset_s,
+            metres_per_unit=options.metres_per_unit,
         )
     )  # fmt: skip
     return DONE

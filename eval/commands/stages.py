@@ -52,6 +52,11 @@ def add_stage_commands(commands: Any) -> None:
              "(default: unknown; --mode paper needs it, with a heading)",
     )  # fmt: skip
     add_beforehand(refine)
+    refine.add_argument(
+        "--findings", type=Path, metavar="FILE.geojson",
+        help="also write where the map seems wrong: roads drawn metres off, missing, or led the wrong way; in latitude and "
+             "longitude if the network knows them, else in its metres (default: none; --mode paper finds none)",
+    )  # fmt: skip
     _add_settings(refine, "refinement")
     refine.add_argument("--out", type=Path, required=True, metavar="MAP.pbstream", help="file for the topometric map")
 
@@ -95,7 +100,11 @@ def _refine(options: argparse.Namespace) -> int:
     from hippodrome.eval.methods.stages import refine_files
 
     known = Beforehand(options.metres_per_unit, options.network_accuracy_m)
-    refine_files(options.map, options.network, options.mode, options.start, options.scenario, options.out, known)
+    refinement = refine_files(options.map, options.network, options.mode, options.start, options.scenario, options.out, known)
+    if options.findings is not None:
+        from hippodrome.eval.real.findings_file import tell_findings
+
+        tell_findings(refinement, options.network, options.out.parent, known, options.findings)
     return DONE
 
 

@@ -41,6 +41,7 @@ from hippodrome.sim.network import junction_gaps, read_network
 from hippodrome.sim.recording import open_recording
 from hippodrome.sim.scenario import Scenario, load_scenario
 
+FARTHEST_START_M = 1_000.0  # from the nearest road; a car park or a yard is nearer
 MapT_co = TypeVar("MapT_co", covariant=True)
 ResultT = TypeVar("ResultT")
 ArgumentsP = ParamSpec("ArgumentsP")
@@ -151,6 +152,8 @@ def refine_files(
     net_file = network_file(network, out.parent)
     known_start = placed_start(start, net_file, mode)
     roads = _read_lanes(net_file)
+    if known_start is not None:
+        _require_start_near(known_start, roads, net_file)
     refinement, cpu_s = timed(refine, cognitive_map, roads, config, known_start)
     if not np.isfinite(refinement.cognitive_map.poses).all():
         raise HippodromeError(
@@ -165,6 +168,16 @@ def refine_files(
     if (warning := refusal_note(refinement.cognitive_map)) is not None:
         print(f"{out}: {warning}")
     return refinement
+
+
+def _require_start_near(start: StartPose, roads: RoadNetwork, net_file: Path) -> None:
+    """Raise HippodromeError if a start lies so far from all roads that it must be another place's, or in other coordinates."""
+    away_m = float(np.hypot(*(roads.points_m - (start.x_m, start.y_m)).T).min())
+    if away_m > FARTHEST_START_M:
+        raise HippodromeError(
+            f"--start: lies {away_m / 1e3:.1f} km from the nearest road of {net_file}, at x {start.x_m:.0f}, y {start.y_m:.0f} m "
+            "of it; look whether latitude and longitude are in this order, or leave it out"
+        )
 
 
 def read_roads(network: Path, folder: Path) -> RoadNetwork:

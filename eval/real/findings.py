@@ -30,6 +30,7 @@ SHORTEST_MISSING_M: Final = 30.0  # of a missing road; a shorter one may be a ya
 SAME_M: Final = 15.0  # a road that is driven again is told once: stretches whose middles lie nearer than this are one
 AWAY_M: Final = 8.0  # farther than this from every lane there is no road
 OPPOSITE_RAD: Final = 2.4  # a lane that is turned by more against the drive leads the other way
+ALONG_RAD: Final = 0.7  # and one that is turned by less leads along with it
 SAMPLE_M: Final = 2.0  # lanes are looked at in points so far apart
 MOST_SHARE: Final = 0.7  # of the vertices of a stretch must lie so
 
@@ -159,9 +160,9 @@ def _off_the_roads(refinement: Refinement, roads: RoadNetwork) -> Iterator[Findi
 
 
 def _leads_back(lane_headings_rad: FloatArray, heading_rad: float) -> bool:
-    """Whether there are lanes, and all of them lead against the drive."""
+    """Whether a lane leads against the drive, and none along with it; those of side streets do neither."""
     turned = np.abs(wrap(lane_headings_rad - heading_rad))
-    return bool(len(turned)) and bool((turned > OPPOSITE_RAD).all())
+    return bool((turned > OPPOSITE_RAD).any()) and not bool((turned < ALONG_RAD).any())
 
 
 def _long_enough(kind: Kind, first: int, last: int, poses: FloatArray) -> Iterator[Finding]:

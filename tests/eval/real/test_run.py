@@ -137,6 +137,13 @@ def test_the_unit_said_at_import_reaches_the_refinement(tmp_path, drive, capsys)
     assert "metres_per_unit=1.0" in provenance["refine"] and "survey_sigma_m=1.0" in provenance["refine"]
 
 
+def test_a_start_in_another_place_is_refused(drive, finished, tmp_path, capsys):
+    arguments = ["refine", str(finished / "semi.pbstream"), "--network", str(drive[1]), "--out", str(tmp_path / "topo.pbstream")]
+    for start in ("geo:8.4,49.0", "3000,4000,90"):
+        assert main([*arguments, "--start", start]) == BAD_INPUT
+        assert "km from the nearest road" in capsys.readouterr().err
+
+
 def test_a_folder_of_other_things_is_left_alone(drive, tmp_path, capsys):
     (tmp_path / "mine.txt").write_text("mine")
     assert main(["run", str(drive[0]), "--network", str(drive[1]), "--out", str(tmp_path)]) == BAD_INPUT

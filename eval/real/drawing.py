@@ -13,7 +13,6 @@ import numpy as np
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, MatchStatus, UInt8Array
 from hippodrome.eval.real.drive import COLOURS, FINDING, MAX_ROWS, WORDS, Drive, marks, same_frame, status_of, truth_line
-from hippodrome.eval.real.findings import middle_m
 from hippodrome.eval.report.markup import Html, element, joined
 
 MARGIN_M: Final = 60.0  # roads are drawn up to so far around the drive
@@ -44,7 +43,8 @@ def drive_map(drive: Drive) -> Iterable[Html]:
     for letter, finding in zip(marks(len(drive.findings)), drive.findings[:MAX_ROWS], strict=False):
         line = place.line(np.array(finding.points_m))
         parts.append(Html(f'<path class="line" stroke="{FINDING}" stroke-width="{9 * pixel:.1f}" opacity="0.45" d="{line}"/>'))
-        parts.append(_mark(place, np.array(middle_m(finding)), letter, FINDING, pixel))
+        third = np.array(finding.points_m[len(finding.points_m) // 3])  # in the middle a stretch without a road has its number
+        parts.append(_mark(place, third, letter, FINDING, pixel))
     parts.append(_mark(place, poses[0, :2], "start", "var(--ink)", pixel))
     name = f"map of {drive.name} over the roads of {drive.network}"
     size = f'viewBox="0 0 {width} {height}" style="--pixel: {pixel:.2f}px"'

@@ -123,6 +123,15 @@ def test_a_phones_fixes_find_their_place_on_the_drives_clock(tmp_path, capsys):
     assert truth.t_s[0] == pytest.approx(7.25 - begin_s(motion), abs=1e-6)
 
 
+def test_nanoseconds_below_a_header_of_seconds_are_told_by_their_size(tmp_path, capsys):
+    rows = "".join(f"{1317038544100000000 + i * 100_000_000},8,0.1\n" for i in range(100))
+    (tmp_path / "o.csv").write_text("t_s,speed,yaw_rate\n" + rows)
+    arguments = ["import", str(tmp_path / "o.csv"), "--from", "odometry", "--out", str(tmp_path / "in")]
+    assert main(arguments) == DONE
+    said = capsys.readouterr().out
+    assert "time stamps taken for nanoseconds" in said and "over 10.0 s" in said
+
+
 def test_an_offset_of_the_truth_needs_two_clocks(tmp_path, capsys):
     drive = axle_drive(3, seconds=60.0)
     motion = motion_in_other_clock(drive, 0.0)

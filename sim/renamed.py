@@ -1,9 +1,13 @@
-"""Keys and values of scenarios that have been renamed: files and commands that use the old names go on working."""
+"""Keys and values of scenarios that have been renamed or removed: files that use the old names go on working.
+
+A removed key has no effect any more: it is left out, and a note says so and why.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any, Final
 
 NETWORKS: Final = ("mapper.attractor.head", "mapper.attractor.grid", "localizer.head", "localizer.grid")
@@ -12,6 +16,10 @@ VALUES: Final[dict[str, dict[str, str]]] = {  # by the key's new name
     "refine.mode": {"default": "route"},
     "localizer.mode": {"default": "coupled"},
     **{f"{network}.mode": {"default": "bounded"} for network in NETWORKS},
+}
+REMOVED: Final = {  # by the key's present name, why it is gone
+    f"refine.route.confidence.{name}": "a route is now held against the mirrored drive, see docs/algorithms.md"
+    for name in ("turning_nats", "evidence_growth_nats")
 }
 
 
@@ -29,12 +37,18 @@ def present_value(key: str, value: Any) -> Any:
 
 
 def with_present_names(scenario: Any) -> Any:
-    """A scenario as plain data, old names replaced; where the old and the new name of a key stand side by side, both stay."""
+    """A scenario as plain data, old names replaced and removed keys left out, which a note on stderr tells.
+
+    Where the old and the new name of a key stand side by side, both stay.
+    """
     for old, new in KEYS.items():
         (*parents, last), present = old.split("."), new.rpartition(".")[2]
         scenario = _changed(scenario, parents, partial(_renamed, last, present))
     for key in VALUES:
         scenario = _changed(scenario, key.split("."), partial(present_value, key))
+    for key in REMOVED:
+        *parents, last = key.split(".")
+        scenario = _changed(scenario, parents, partial(_without, last, key))
     return scenario
 
 
@@ -51,3 +65,16 @@ def _renamed(old: str, new: str, data: Any) -> Any:
     if not isinstance(data, dict) or new in data:
         return data
     return {new if name == old else name: value for name, value in data.items()}
+
+
+def _without(name: str, key: str, data: Any) -> Any:
+    if not isinstance(data, dict) or name not in data:
+        return data
+    _tell_removed(key)
+    return {other: value for other, value in data.items() if other != name}
+
+
+@cache
+def _tell_removed(key: str) -> None:
+    """Say once that a key has no effect."""
+    print(f"note: {key} has no effect any more and is ignored: {REMOVED[key]}", file=sys.stderr)

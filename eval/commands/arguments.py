@@ -201,3 +201,47 @@ def refine_mode(text: str) -> str:
 def localizer_mode(text: str) -> str:
     """A mode of the localizer, also by an old name."""
     return str(present_value("localizer.mode", text))
+
+
+def add_beforehand(parser: argparse.ArgumentParser) -> None:
+    """What may be known about the odometry and about the roads before a drive is laid on them."""
+    add_units(parser, "unknown, it is searched for")
+    parser.add_argument(
+        "--network-accuracy", type=accuracy_m, metavar="METRES", dest="network_accuracy_m",
+        help="how far the roads are drawn from where they are: standard deviation in each axis, metres; 0: they are exact "
+             "(default: 2.5 for a network that says where on Earth it lies, as those of OpenStreetMap do, else 0)",
+    )  # fmt: skip
+
+
+def add_units(parser: argparse.ArgumentParser, default: str) -> None:
+    """The unit of length of the odometry."""
+    parser.add_argument(
+        "--units", type=units, metavar="metres|METRES_PER_UNIT", dest="metres_per_unit",
+        help="the unit of length of the self-motion, right within 10 %%: metres (wheels, stereo, GPS) or its length in metres "
+             "(for speeds in km/h: 0.2778). The search is then several times faster, and shorter drives can be vouched for "
+             f"(default: {default})",
+    )  # fmt: skip
+
+
+def units(text: str) -> float:
+    """``metres``, or how many of them a unit of the odometry has."""
+    if text == "metres":
+        return 1.0
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 1e-6 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f"'{text}' is neither metres nor a number of metres from 1e-6 to 1e6")
+    return value
+
+
+def accuracy_m(text: str) -> float:
+    """Metres from 0 on, below the width of a town."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= 100.0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of metres from 0 to 100")
+    return value

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_units
 
 EXPORTS = ("tum", "kitti", "euroc", "mcap", "rerun", "evo", "rosbag2", "gpx", "geojson")
 IMPORTS = ("images", "video", "odometry", "kitti", "kitti-raw", "tum", "euroc", "donkeycar", "mcap", "rosbag")
@@ -61,6 +61,7 @@ def add_exchange_commands(commands: Any) -> None:
         help="a video, a folder of images, a sequence's folder, a tub, an .mcap file, a ROS bag, or a file of self-motion",
     )  # fmt: skip
     add_drive_options(into)
+    add_units(into, "unknown; `hippodrome refine` may be told later")
     into.add_argument("--out", type=Path, required=True, metavar="RECORDING", help="a new folder; one that exists is not touched")
     _add_score(commands)
 
@@ -118,6 +119,11 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
         help="the same for the poses of the truth, where it is another point's (default: as --camera-ahead)",
     )  # fmt: skip
     _add_truth(into, "the layout's own, if any")
+    into.add_argument(
+        "--truth-offset", type=_offset, default=0.0, metavar="S", dest="truth_offset_s",
+        help="seconds to add to the times of the truth, to lay its clock on the drive's (a video begins at 0, a GPX file has the "
+             "date); auto: told by the turns of both; refused where that is not sure (default: 0)",
+    )  # fmt: skip
     into.add_argument(
         "--axes", choices=["body", "camera"],
         help="which way poses point: body: x forward, z up; camera: z forward, y down (default: body; for kitti, camera)",
@@ -283,7 +289,8 @@ def import_command(options: argparse.Namespace) -> int:
             network=options.network, truth_sigma_m=options.truth_sigma, axes=options.axes, truth_frame=options.truth_frame,
             size_px=options.size, fps=options.fps, time_unit=options.time_unit, time_offset_s=options.time_offset_s,
             calibration=options.calibration, camera_height_m=options.camera_height_m, camera_ahead=options.camera_ahead,
-            truth_ahead=options.truth_ahead, topics=tuple(options.topics),
+            truth_ahead=options.truth_ahead, topics=tuple(options.topics), truth_offset_s=options.truth_offset_s,
+            metres_per_unit=options.metres_per_unit,
         )
     )  # fmt: skip
     return DONE

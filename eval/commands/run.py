@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, add_command, start_pose, write_alone
+from hippodrome.eval.commands.arguments import DONE, add_beforehand, add_command, start_pose, write_alone
 from hippodrome.eval.commands.exchange import add_drive_options, add_exchange_commands, import_command
 
 
@@ -37,6 +37,7 @@ def add_drive_command(commands: Any) -> None:
         help="pose at the start of the drive, in the network's frame: metres, metres, degrees counter-clockwise from east; or "
              "a GPS fix and the heading of a compass (default: unknown, it is searched for)",
     )  # fmt: skip
+    add_beforehand(parser)
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="folder for the results; what is finished in it is not made again"
     )
@@ -44,29 +45,64 @@ def add_drive_command(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from hippodrome.eval.methods.beforehand import Beforehand
     from hippodrome.eval.real.run import RunOptions, run_drive
     from hippodrome.sim.recording import MANIFEST
 
     is_recording = (options.drive / MANIFEST).is_file()
+    if is_recording:
+        _refuse_import_options(options)
 
     def import_to(recording: Path, net_file: Path) -> None:
         wanted = {"source": options.drive, "out": recording, "network": net_file}
         import_command(argparse.Namespace(**{**vars(options), **wanted}))
 
-    outside = {"command", "drive", "network", "out"}  # what is not an option of the results
-    asked = {f"--{name.replace('_', '-')}": str(value) for name, value in vars(options).items() if name not in outside}
     run_drive(
         RunOptions(
             drive=options.drive,
             network=options.network,
             out=options.out,
             start=options.start,
+            known=Beforehand(options.metres_per_unit, options.network_accuracy_m),
             import_to=None if is_recording else import_to,
             score=_score,
-            asked=asked,
+            asked=_said(options, [*_import_actions(), *_matching_actions()]),
         )
     )
     return DONE
+
+
+def _import_actions() -> list[argparse.Action]:
+    """The options that only the import of a drive heeds."""
+    parser = argparse.ArgumentParser(add_help=False)
+    add_drive_options(parser)
+    return [action for action in parser._actions if action.dest != "network"]
+
+
+def _matching_actions() -> list[argparse.Action]:
+    """The options that only the refinement heeds."""
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--start")
+    add_beforehand(parser)
+    return parser._actions
+
+
+def _said(options: argparse.Namespace, actions: list[argparse.Action]) -> dict[str, str]:
+    """What the user said by these options, by the option's name: those that have their default are left out."""
+    given = ((action, getattr(options, action.dest)) for action in actions)
+    return {action.option_strings[0]: str(value) for action, value in given if value != action.default}
+
+
+def _refuse_import_options(options: argparse.Namespace) -> None:
+    """Raise HippodromeError if options of the import were given for a drive that is a recording already."""
+    if said := _said(options, _import_actions()):
+        from hippodrome.core.types import HippodromeError
+
+        cure = "hold the map against it with `hippodrome score`" if "--truth" in said else "leave that out"
+        raise HippodromeError(
+            f"{options.drive}: is a recording already, and {', '.join(sorted(said))} would say how to make one; {cure}, or give "
+            "as DRIVE what it was made of"
+        )
 
 
 def _score(topometric: Path, recording: Path) -> None:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, add_command, refine_mode, start_pose
+from hippodrome.eval.commands.arguments import DONE, add_beforehand, add_command, refine_mode, start_pose
 
 
 def add_stage_commands(commands: Any) -> None:
@@ -51,6 +51,12 @@ def add_stage_commands(commands: Any) -> None:
              "geo:LAT,LON[,HEADING]: a GPS fix in WGS84 degrees, heading of a compass, clockwise from north; it may be left out "
              "(default: unknown; --mode paper needs it, with a heading)",
     )  # fmt: skip
+    add_beforehand(refine)
+    refine.add_argument(
+        "--findings", type=Path, metavar="FILE.geojson",
+        help="also write where the map seems wrong: roads drawn metres off, missing, or led the wrong way; in latitude and "
+             "longitude if the network knows them, else in its metres (default: none; --mode paper finds none)",
+    )  # fmt: skip
     _add_settings(refine, "refinement")
     refine.add_argument("--out", type=Path, required=True, metavar="MAP.pbstream", help="file for the topometric map")
 
@@ -90,9 +96,15 @@ def _map(options: argparse.Namespace) -> int:
 
 
 def _refine(options: argparse.Namespace) -> int:
+    from hippodrome.eval.methods.beforehand import Beforehand
     from hippodrome.eval.methods.stages import refine_files
 
-    refine_files(options.map, options.network, options.mode, options.start, options.scenario, options.out)
+    known = Beforehand(options.metres_per_unit, options.network_accuracy_m)
+    refinement = refine_files(options.map, options.network, options.mode, options.start, options.scenario, options.out, known)
+    if options.findings is not None:
+        from hippodrome.eval.real.findings_file import tell_findings
+
+        tell_findings(refinement, options.network, options.out.parent, known, options.findings)
     return DONE
 
 

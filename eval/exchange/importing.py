@@ -20,6 +20,7 @@ from hippodrome.eval.exchange.drives.lever import Ahead
 from hippodrome.eval.exchange.drives.new_recording import camera_record, field_of_view_deg, seal, write_frames, write_steps
 from hippodrome.eval.exchange.drives.offset import (
     TimeOffset,
+    Turns,
     told_offset,
     turns_of_frames,
     turns_of_motion,
@@ -36,6 +37,7 @@ from hippodrome.eval.exchange.readers.layouts import recognised
 from hippodrome.eval.exchange.readers.pictures import read_image_folder, read_video
 from hippodrome.eval.exchange.readers.self_motion import read_bare_odometry, read_self_motion
 from hippodrome.eval.exchange.readers.tables import is_kitti_poses, read_poses
+from hippodrome.eval.methods.beforehand import UNITS
 
 # Layout -> module below ``readers`` and its function, which takes the source and the axes of its poses.
 READERS: Final = {
@@ -75,6 +77,8 @@ class ImportOptions:
     camera_ahead: Ahead = "auto"  # how far ahead of the rear axle the poses of ``odometry`` lie, in their unit
     topics: tuple[str, ...] = ()  # those of a log that are used; the others are chosen by their names and types
     truth_ahead: Ahead | None = None  # the same of the truth's poses; None: as ``camera_ahead``
+    truth_offset_s: TimeOffset = 0.0  # added to the times of the truth; "auto": told by turns
+    metres_per_unit: float | None = None  # length of the self-motion's unit; None: unknown
 
 
 def import_drive(options: ImportOptions) -> None:
@@ -97,6 +101,9 @@ def import_drive(options: ImportOptions) -> None:
         if options.odometry == FROM_TRUTH and known is not None:
             known = known.moved(offset_s)
             truth = known.trajectory
+    if options.truth_offset_s == "auto" and (told_s := _truth_offset_s(options, motion, known)) and known is not None:
+        known = known.moved(told_s)
+        truth = known.trajectory
     require_plausible(motion, f"{options.source}: self-motion ({origin})")
     frames = frames_within(drive.frames, motion, options.source)
     samples = steps_of(frames, motion, truth)
@@ -122,11 +129,15 @@ def import_drive(options: ImportOptions) -> None:
             "camera": camera_record(samples, (width, height), fov_deg),
             "truth_share": round(truth_share, 6),
             "truth_frame": "network" if known is not None and known.in_network else options.truth_frame,
+            **({} if options.metres_per_unit is None else {UNITS: options.metres_per_unit}),
         }
         seal(building, content, samples)
+    truth_words = f"truth for {truth_share:.0%} of the steps"
+    if known is not None and not known.has_heading:
+        truth_words = f"truth: {len(known.trajectory.t_s)} fixes"
     pictures = f"{len(frames)} frames of {width} x {height}" if frames else "no frames"
     print(f"{options.out}: {kind}, {pictures}, {len(samples.t_s)} steps over {samples.t_s[-1]:.1f} s; "
-          f"self-motion: {origin}; truth for {truth_share:.0%} of the steps")  # fmt: skip
+          f"self-motion: {origin}; {truth_words}")  # fmt: skip
     for note in known.notes if known is not None else ():
         print(f"note: {note}")
     if (lost := len(drive.frames) - len(frames)) > 0:
@@ -198,7 +209,24 @@ def _known_truth(options: ImportOptions, drive: ForeignDrive, axes: Axes, pose_t
     else:
         known = read_truth(options.truth, axes, options.network, options.truth_sigma_m)
     said = options.camera_ahead if options.truth_ahead is None else options.truth_ahead
-    return None if known is None else known.at_axle(said, "the truth")
+    if known is None:
+        return None
+    offset_s = 0.0 if options.truth_offset_s == "auto" else options.truth_offset_s
+    return known.at_axle(said, "the truth").moved(offset_s)
+
+
+def _truth_offset_s(options: ImportOptions, motion: Motion, known: Truth | None) -> float:
+    """Seconds to add to the times of the truth, told by turns and printed. Raises ExchangeError where they do not tell."""
+    if known is None or options.odometry == FROM_TRUTH:
+        raise ExchangeError(
+            f"{options.source}: --truth-offset auto needs a truth and a self-motion that is not the truth's; leave it out"
+        )
+    if len(known.trajectory.t_s) < 3:
+        raise ExchangeError(f"{options.source}: a truth of less than three places tells no offset; give --truth-offset SECONDS")
+    truth = turns_of_trajectory(known.trajectory, "the truth")
+    if not known.has_heading:  # of a fix it is the direction to the next one, and so that of the time halfway there
+        truth = Turns((truth.t_s[:-1] + truth.t_s[1:]) / 2.0, truth.angle[:-1], truth.name)
+    return told_offset(truth, turns_of_motion(motion), "--truth-offset")
 
 
 def _motion(

@@ -30,6 +30,7 @@ from hippodrome.core.types import (
 )
 from hippodrome.eval.files.scenarios import located
 from hippodrome.eval.files.trajectories import write_tum
+from hippodrome.eval.methods.beforehand import UNITS, Beforehand, informed
 from hippodrome.eval.methods.method import RefineMode
 from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.proto.codec import load_map, save_map
@@ -40,6 +41,7 @@ from hippodrome.sim.network import junction_gaps, read_network
 from hippodrome.sim.recording import open_recording
 from hippodrome.sim.scenario import Scenario, load_scenario
 
+FARTHEST_START_M = 1_000.0  # from the nearest road; a car park or a yard is nearer
 MapT_co = TypeVar("MapT_co", covariant=True)
 ResultT = TypeVar("ResultT")
 ArgumentsP = ParamSpec("ArgumentsP")
@@ -114,14 +116,21 @@ def map_files(recording: Path, scenario: Path | None, out: Path) -> None:
     config = _settings(scenario).mapper
     mapper = Mapper(config) if source.frame_count else MotionMapper(config)
     cognitive_map, cpu_s = map_recording(source.observations(), mapper)
-    size = save_map(out, cognitive_map, {"recording": recording.name, "mapper": repr(config)})
+    unit = {UNITS: str(source.manifest[UNITS])} if UNITS in source.manifest else {}
+    size = save_map(out, cognitive_map, {"recording": recording.name, "mapper": repr(config), **unit})
     duration_s = source.samples.t_s[-1]
     print(f"{out}: {len(cognitive_map.t_s)} vertices, {len(cognitive_map.edges.source)} edges, {size} bytes, "
           f"CPU {100 * cpu_s / duration_s:.2f} % of the drive's {duration_s:.0f} s")  # fmt: skip
 
 
 def refine_files(
-    source: Path, network: Path, mode: RefineMode, start: StartPose | GeoStart | None, scenario: Path | None, out: Path
+    source: Path,
+    network: Path,
+    mode: RefineMode,
+    start: StartPose | GeoStart | None,
+    scenario: Path | None,
+    out: Path,
+    known: Beforehand | None = None,
 ) -> Refinement:
     """``hippodrome refine``: refine a semi-metric map with a road network. Raises HippodromeError on bad input.
 
@@ -132,18 +141,24 @@ def refine_files(
         start: Where the mapping drive began, in the network's frame or on Earth; mode ``paper`` needs it.
         scenario: Where the refinement's settings are from; None takes the defaults.
         out: The topometric map.
+        known: Unit of the odometry and accuracy of the network, where they are known.
     """
     if mode == "paper" and start is None:
         raise HippodromeError("mode 'paper' begins at a known pose: give --start X,Y,HEADING, or use --mode route")
     cognitive_map, provenance = load_map(source)
-    config = replace(_settings(scenario).refine, mode=mode)
+    config, lines = informed(replace(_settings(scenario).refine, mode=mode), known or Beforehand(), provenance)
+    for line in lines:
+        print(line)
     net_file = network_file(network, out.parent)
     known_start = placed_start(start, net_file, mode)
     roads = _read_lanes(net_file)
+    if known_start is not None:
+        _require_start_near(known_start, roads, net_file)
     refinement, cpu_s = timed(refine, cognitive_map, roads, config, known_start)
     if not np.isfinite(refinement.cognitive_map.poses).all():
         raise HippodromeError(
-            f"{source}: {len(cognitive_map.t_s)} vertices are too few to be laid on roads; drive farther, some 100 m and a corner"
+            f"{source}: {len(cognitive_map.t_s)} vertices, too few or without any turn, cannot be laid on roads; drive farther, "
+            "some 100 m and a corner"
         )
     save_map(out, refinement.cognitive_map, {**provenance, "network": network.name, "refine": repr(config)})
     for stretch in refinement.breaks:
@@ -153,6 +168,16 @@ def refine_files(
     if (warning := refusal_note(refinement.cognitive_map)) is not None:
         print(f"{out}: {warning}")
     return refinement
+
+
+def _require_start_near(start: StartPose, roads: RoadNetwork, net_file: Path) -> None:
+    """Raise HippodromeError if a start lies so far from all roads that it must be another place's, or in other coordinates."""
+    away_m = float(np.hypot(*(roads.points_m - (start.x_m, start.y_m)).T).min())
+    if away_m > FARTHEST_START_M:
+        raise HippodromeError(
+            f"--start: lies {away_m / 1e3:.1f} km from the nearest road of {net_file}, at x {start.x_m:.0f}, y {start.y_m:.0f} m "
+            "of it; look whether latitude and longitude are in this order, or leave it out"
+        )
 
 
 def read_roads(network: Path, folder: Path) -> RoadNetwork:

@@ -16,11 +16,15 @@ from typing import Any, Final, TextIO, TypeVar
 import numpy as np
 
 from hippodrome._files import sha256_of, write_atomically
-from hippodrome.core.types import CognitiveMap, HippodromeError, MatchBreak, MatchStatus, Refinement, StartPose
-from hippodrome.eval.exchange.drives.exported import truth_of
+from hippodrome.core.types import CognitiveMap, HippodromeError, MatchBreak, MatchStatus, StartPose
+from hippodrome.eval.exchange.drives.truth import stored_truth
+from hippodrome.eval.methods.beforehand import Beforehand
 from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.eval.methods.stages import map_files, network_file, read_roads, refine_files
-from hippodrome.eval.real.page import Drive, drive_page
+from hippodrome.eval.real.drive import Drive
+from hippodrome.eval.real.findings import from_record, to_record, usual_error_m
+from hippodrome.eval.real.findings_file import reference_of, tell_findings
+from hippodrome.eval.real.page import drive_page
 from hippodrome.proto.codec import load_map
 from hippodrome.sim.geo_start import GeoStart
 from hippodrome.sim.recording import MANIFEST, open_recording
@@ -30,6 +34,7 @@ RECORDING: Final = "recording"
 SEMI_METRIC: Final = "semi.pbstream"
 TOPOMETRIC: Final = "topo.pbstream"
 REFINEMENT: Final = "refinement.json"
+FINDINGS: Final = "findings.geojson"
 PAGE: Final = "drive.html"
 ResultT = TypeVar("ResultT")
 
@@ -42,6 +47,7 @@ class RunOptions:
     network: Path  # SUMO, OpenStreetMap or OpenDRIVE
     out: Path
     start: StartPose | GeoStart | None
+    known: Beforehand  # unit of the odometry, accuracy of the network
     import_to: Callable[[Path, Path], object] | None  # (recording to be made, SUMO network); None: ``drive`` is a recording
     score: Callable[[Path, Path], object]  # prints the errors of a map against a recording's truth
     asked: Mapping[str, str]
@@ -120,17 +126,21 @@ def run_drive(options: RunOptions) -> None:
 
 
 def _check_same(out: Path, asked: Mapping[str, str]) -> None:
-    """Raises HippodromeError if the folder holds results that were asked for otherwise, or is not ours."""
+    """Raises HippodromeError if the folder holds results that were asked for otherwise, or is not ours.
+
+    A run that ended before it had any result, as its options were wrong, may be told others.
+    """
     if not out.exists() or not any(out.iterdir()):
         return
     if not (out / RECORD).exists() and not (out / RECORDING).exists():
         raise HippodromeError(f"{out}: holds other files than a run's; choose a new --out")
+    imported = (out / RECORDING / MANIFEST).exists()
+    if not imported and not (out / SEMI_METRIC).exists():
+        return
     before = _record_of(out).get("asked", asked)
     if differing := sorted(name for name in {*before, *asked} if before.get(name) != asked.get(name)):
-        raise HippodromeError(
-            f"{out}: was made with another {', '.join(differing)}; choose a new --out (the drive is imported already: give "
-            f"{out / RECORDING} as DRIVE)"
-        )
+        hint = f" (the drive is imported already: give {out / RECORDING} as DRIVE)" if imported else ""
+        raise HippodromeError(f"{out}: was made with another {', '.join(differing)}; choose a new --out{hint}")
 
 
 def _record_of(out: Path) -> dict[str, Any]:
@@ -169,25 +179,36 @@ def _silently(work: Callable[[], ResultT]) -> ResultT:
 
 
 def _refine(options: RunOptions, net_file: Path, topometric: Path) -> None:
-    refinement: Refinement = refine_files(options.out / SEMI_METRIC, net_file, "route", options.start, None, topometric)
+    semi_metric = options.out / SEMI_METRIC
+    refinement = refine_files(semi_metric, net_file, "route", options.start, None, topometric, options.known)
+    found = tell_findings(refinement, net_file, options.out, options.known, options.out / FINDINGS)
     breaks = [
         {"first": one.first_vertex, "last": one.last_vertex, "status": one.status.name, "cause": one.cause}
         for one in refinement.breaks
     ]
-    content = {"breaks": breaks, "estimates": {name: float(value) for name, value in refinement.estimates.items()}}
+    content = {
+        "breaks": breaks,
+        "estimates": {name: float(value) for name, value in refinement.estimates.items()},
+        "findings": [to_record(one) for one in found],
+        "map_error_m": usual_error_m(refinement),
+    }
     write_atomically(options.out / REFINEMENT, (json.dumps(content, indent=1) + "\n").encode())
 
 
+def _read_refinement(out: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((out / REFINEMENT).read_text(encoding="utf-8"))
+    return content
+
+
 def _read_breaks(out: Path) -> tuple[MatchBreak, ...]:
-    content = json.loads((out / REFINEMENT).read_text(encoding="utf-8"))
-    found = ((one["first"], one["last"], MatchStatus[one["status"]], one["cause"]) for one in content["breaks"])
+    found = ((one["first"], one["last"], MatchStatus[one["status"]], one["cause"]) for one in _read_refinement(out)["breaks"])
     return tuple(MatchBreak(first, last, status, cause) for first, last, status, cause in found)
 
 
 def _score(options: RunOptions, topometric: Path, recording: Path) -> None:
     """The scores, where there is a truth; a map that cannot be scored is none that cannot be used."""
     try:
-        if truth_of(open_recording(recording, verify=False)) is None:
+        if stored_truth(open_recording(recording, verify=False)) is None:
             print("not scored: the drive came without truth")
             return
         options.score(topometric, recording)
@@ -196,6 +217,7 @@ def _score(options: RunOptions, topometric: Path, recording: Path) -> None:
 
 
 def _write_page(options: RunOptions, recording: Path, net_file: Path, stages: _Stages) -> None:
+    refined = _read_refinement(options.out)
     drive = Drive(
         name=options.drive.name,
         network=options.network.name,
@@ -203,6 +225,9 @@ def _write_page(options: RunOptions, recording: Path, net_file: Path, stages: _S
         cognitive_map=load_map(options.out / TOPOMETRIC)[0],
         roads=_silently(lambda: read_roads(net_file, options.out)),
         breaks=_read_breaks(options.out),
+        findings=tuple(map(from_record, refined.get("findings", []))),
+        map_error_m=refined.get("map_error_m"),
+        reference=reference_of(net_file),
         scores=tuple(stages.said("score")),
         notes=tuple(line for name in ("roads", "import", "refine") if name in stages.done for line in stages.said(name)),
         stages={name: one["seconds"] for name, one in stages.done.items()},

@@ -17,7 +17,7 @@ from hippodrome.eval.contest.sources import methods_sha256
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.reuse import figure_code_sha256
 from hippodrome.eval.sweep.executors import SweepError
-from hippodrome.sim.renamed import present_key
+from hippodrome.sim.renamed import REMOVED, present_key
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS
 from hippodrome.sim.yaml_file import ScenarioError, parse_yaml
@@ -101,6 +101,8 @@ def make_grid(
 
 def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
     """The scenario with one key replaced, checked as if it stood in the file. Raises SweepError that names the key."""
+    if (reason := REMOVED.get(present_key(key))) is not None:
+        raise SweepError(f"--set {key}: has no effect any more: {reason}")
     values = scenario.model_dump()
     *parents, last = present_key(key).split(".")
     place: Any = values

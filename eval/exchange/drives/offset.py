@@ -79,8 +79,8 @@ def turns_of_frames(frames: Sequence[ForeignFrame], undistort: Callable[[Frame],
     return Turns(np.array([frame.t_s for frame in frames]), np.concatenate([[0.0], np.cumsum(shifts)]), "the frames")
 
 
-def offset_between(moved: Turns, fixed: Turns) -> Offset:
-    """The offset that lays ``moved`` on ``fixed``, which ``printed`` judges.
+def offset_between(moved: Turns, fixed: Turns, option: str = "--time-offset") -> Offset:
+    """The offset that lays ``moved`` on ``fixed``, which ``told_offset`` judges; ``option`` is what would say it instead.
 
     Raises ExchangeError if one of them is too short, or hardly turns.
     """
@@ -89,7 +89,7 @@ def offset_between(moved: Turns, fixed: Turns) -> Offset:
     least = max(LEAST_OVERLAP_S, 0.5 * min(len(first), len(second)) * step_s) / step_s
     if min(len(first), len(second)) < least:
         raise ExchangeError(f"less than {LEAST_OVERLAP_S:g} s of {moved.name} or {fixed.name}: no offset can be told; "
-                            "give --time-offset SECONDS")  # fmt: skip
+                            f"give {option} SECONDS")  # fmt: skip
     lags, correlation = _correlations(first, second, least)
     best = int(np.argmax(correlation))
     shift = lags[best] + _vertex(correlation, best)
@@ -99,14 +99,14 @@ def offset_between(moved: Turns, fixed: Turns) -> Offset:
     return Offset(float(seconds), float(correlation[best]), next_best)
 
 
-def told_offset(moved: Turns, fixed: Turns) -> float:
-    """The offset, which is printed with its correlation. Raises ExchangeError where it is not sure."""
+def told_offset(moved: Turns, fixed: Turns, option: str = "--time-offset") -> float:
+    """The offset, which is printed with its correlation. Raises ExchangeError, naming ``option``, where it is not sure."""
     if float(np.abs(np.diff(moved.angle)).sum()) < LEAST_TURN_RAD:
-        raise ExchangeError(f"{moved.name} hardly turns: no offset can be told; give --time-offset SECONDS")
-    found = offset_between(moved, fixed)
+        raise ExchangeError(f"{moved.name} hardly turns: no offset can be told; give {option} SECONDS")
+    found = offset_between(moved, fixed, option)
     how = f"correlation of the turns of {moved.name} and of {fixed.name} {found.correlation:.2f}, {found.next_best:.2f} elsewhere"
     if found.correlation < LEAST_CORRELATION or found.correlation - found.next_best < LEAD:
-        raise ExchangeError(f"no sure time offset ({how}; best {found.seconds:.3f} s); give --time-offset SECONDS")
+        raise ExchangeError(f"no sure time offset ({how}; best {found.seconds:.3f} s); give {option} SECONDS")
     print(f"note: time offset {found.seconds:+.3f} s ({how})")
     return found.seconds
 

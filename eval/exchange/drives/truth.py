@@ -106,7 +106,7 @@ def require_overlap(path: Path | None, truth: Truth | None, first_s: float, last
     if not ((t_s >= first_s) & (t_s <= last_s)).any():
         raise ExchangeError(
             f"{path}: its times, {t_s[0]:.3f} to {t_s[-1]:.3f} s, lie outside of the drive's, {first_s:.3f} to {last_s:.3f} s: "
-            "it says nothing of it; give both the same clock"
+            "it says nothing of it; give both the same clock, or --truth-offset SECONDS to add, or --truth-offset auto"
         )
 
 

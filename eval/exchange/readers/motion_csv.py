@@ -31,6 +31,7 @@ SPEEDS: Final = (
 )
 YAW_RATES: Final = ("yaw_rate", "yawrate", "gyro_z", "gyroscope_z", "wz", "wu", "angular_z", "omega", "omega_z", "gyr_z",
                     "rotation_rate_z", "gyrorotationz", "motionrotationratez", "w", "yaw_velocity", "turn_rate")  # fmt: skip
+FARTHEST_S: Final = 1e11  # since 1970, in the year 5138: stamps that are called seconds and are larger are milliseconds or less
 TIME_UNITS: Final[dict[str, TimeUnit]] = {
     "s": "s", "sec": "s", "secs": "s", "seconds": "s", "ms": "ms", "msec": "ms", "millis": "ms", "milliseconds": "ms",
     "us": "us", "µs": "us", "usec": "us", "microseconds": "us", "ns": "ns", "nsec": "ns", "nanos": "ns", "nanoseconds": "ns",
@@ -104,7 +105,10 @@ def read_motion(path: Path, unit: TimeUnit | None = None) -> Motion:
         raise ExchangeError(f"{path}: data row {int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0]) + 1} is not finite")
     if empty:
         print(f"{path}: {empty} row(s) without a time, speed or yaw rate are left out")
-    t_s = in_seconds(table[:, 0], unit or TIME_UNITS.get(columns.time.unit), str(path))
+    named = TIME_UNITS.get(columns.time.unit)
+    if named == "s" and np.abs(table[:, 0]).min() > FARTHEST_S:
+        named = None  # a header that was copied from somewhere: the size of the stamps tells better
+    t_s = in_seconds(table[:, 0], unit or named, str(path))
     speed = table[:, 1] * SPEED_UNITS.get(columns.speed.unit, 1.0)
     return motion_table(t_s, speed, table[:, 2] * YAW_UNITS.get(columns.yaw_rate.unit, 1.0), str(path))
 

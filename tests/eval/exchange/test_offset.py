@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pyproj
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,6 +17,8 @@ from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
 from hippodrome.eval.exchange.drives.foreign import ForeignFrame, Motion, motion_of
 from hippodrome.eval.exchange.drives.offset import Turns, told_offset, turns_of_frames, turns_of_motion, turns_of_trajectory
+from hippodrome.eval.exchange.drives.steps import begin_s
+from hippodrome.eval.exchange.drives.truth import stored_truth
 from hippodrome.sim.recording import open_recording
 from tests.eval.exchange.test_lever import axle_drive
 
@@ -93,6 +96,49 @@ def test_import_with_an_offset_to_be_told(tmp_path, capsys):
     said = capsys.readouterr().out
     assert float(said.split("time offset ")[1].split()[0]) == pytest.approx(-1000.0, abs=0.05)
     assert open_recording(tmp_path / "in").frame_count > 200
+
+
+def fixes_once_a_second(path, drive, later_s):
+    """A phone's fixes of a drive, in another clock, which began 7.25 s after the drive."""
+    t_s = np.arange(drive.t_s[0] + 7.25, drive.t_s[-1], 1.0)
+    x_m, y_m = (np.interp(t_s, drive.t_s, drive.poses[:, axis]) for axis in (0, 1))
+    lon, lat = pyproj.Proj("+proj=tmerc +lat_0=49 +lon_0=8.4 +ellps=WGS84")(x_m, y_m, inverse=True)
+    rows = "".join(f"{t:.3f},{a:.9f},{b:.9f}\n" for t, a, b in zip(t_s + later_s, lat, lon, strict=True))
+    path.write_text("t_s,lat,lon\n" + rows)
+
+
+def test_a_phones_fixes_find_their_place_on_the_drives_clock(tmp_path, capsys):
+    drive = axle_drive(3, seconds=60.0)
+    motion = motion_in_other_clock(drive, 0.0)
+    np.savetxt(tmp_path / "o.csv", np.column_stack([motion.t_s, motion.speed, motion.yaw_rate_radps]), delimiter=",")
+    fixes_once_a_second(tmp_path / "gps.csv", drive, 1.6e9)
+    source = ["import", str(tmp_path / "o.csv"), "--from", "odometry", "--truth", str(tmp_path / "gps.csv")]
+    assert main([*source, "--out", str(tmp_path / "in")]) == BAD_INPUT
+    assert "or --truth-offset SECONDS to add, or --truth-offset auto" in capsys.readouterr().err
+    assert main([*source, "--truth-offset", "auto", "--out", str(tmp_path / "in")]) == DONE
+    said = capsys.readouterr().out
+    assert float(said.split("time offset ")[1].split()[0]) == pytest.approx(-1.6e9, abs=0.2) and "truth: 53 fixes" in said
+    assert main([*source, "--truth-offset", "-1600000000", "--out", str(tmp_path / "in2")]) == DONE
+    truth = stored_truth(open_recording(tmp_path / "in2")).trajectory
+    assert truth.t_s[0] == pytest.approx(7.25 - begin_s(motion), abs=1e-6)
+
+
+def test_nanoseconds_below_a_header_of_seconds_are_told_by_their_size(tmp_path, capsys):
+    rows = "".join(f"{1317038544100000000 + i * 100_000_000},8,0.1\n" for i in range(100))
+    (tmp_path / "o.csv").write_text("t_s,speed,yaw_rate\n" + rows)
+    arguments = ["import", str(tmp_path / "o.csv"), "--from", "odometry", "--out", str(tmp_path / "in")]
+    assert main(arguments) == DONE
+    said = capsys.readouterr().out
+    assert "time stamps taken for nanoseconds" in said and "over 10.0 s" in said
+
+
+def test_an_offset_of_the_truth_needs_two_clocks(tmp_path, capsys):
+    drive = axle_drive(3, seconds=60.0)
+    motion = motion_in_other_clock(drive, 0.0)
+    np.savetxt(tmp_path / "o.csv", np.column_stack([motion.t_s, motion.speed, motion.yaw_rate_radps]), delimiter=",")
+    arguments = ["import", str(tmp_path / "o.csv"), "--from", "odometry", "--truth-offset", "auto", "--out", str(tmp_path / "in")]
+    assert main(arguments) == BAD_INPUT
+    assert "--truth-offset auto needs a truth" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not KITTI_03.exists(), reason="no real data beside the checkout (../shared/real)")

@@ -13,6 +13,12 @@ import pytest
 from hippodrome.core import se2
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
+from hippodrome.eval.real.drive import Drive
+from hippodrome.eval.real.findings import find_wrong_roads
+from hippodrome.eval.real.page import drive_page
+from hippodrome.proto.codec import load_map
+from hippodrome.sim.recording import open_recording
+from tests.eval.real.test_findings import EAST, SIGMA_M, bump, drive_east, straight_road
 from tests.sim.test_map_import import BLOCK
 
 REAL = Path(__file__).parents[3].parent / "shared" / "real" / "kitti-03"
@@ -61,8 +67,9 @@ def test_a_recording_and_an_osm_map_become_a_page(drive, tmp_path, capsys):
     assert said[-2].startswith(NOTHING) and "--start" in said[-2] and said[-1] == f"open {out / 'drive.html'}"
     assert next(line for line in said if re.match(r"\d/5 \w+: [\d.]+ s", line)).startswith("1/5 roads")
     assert {path.name.split("-")[0] for path in out.iterdir()} == {
-        "semi.pbstream", "topo.pbstream", "refinement.json", "run.json", "drive.html", "block",
+        "semi.pbstream", "topo.pbstream", "refinement.json", "run.json", "drive.html", "findings.geojson", "block",
     }  # fmt: skip
+    assert json.loads((out / "findings.geojson").read_text())["features"] == []
 
 
 def test_the_page_needs_nothing_but_itself_and_says_what_to_do(finished):
@@ -97,6 +104,46 @@ def test_results_of_another_map_are_not_mixed_in(drive, finished, tmp_path, caps
     assert "another --start" in capsys.readouterr().err
 
 
+def test_options_of_the_import_are_no_options_of_a_recording(drive, tmp_path, capsys):
+    arguments = ["run", str(drive[0]), "--network", str(drive[1]), "--out", str(tmp_path / "out")]
+    assert main([*arguments, "--fps", "10", "--truth", "gps.gpx"]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "is a recording already, and --fps, --truth would say how to make one" in said and "`hippodrome score`" in said
+
+
+def test_a_run_that_was_told_the_wrong_options_takes_the_right_ones_afterwards(drive, tmp_path, capsys):
+    poses = tmp_path / "poses.txt"
+    turned = np.radians(90.0) * np.clip((np.arange(160) - 100) / 12.0, 0.0, 1.0)
+    x, z = np.cumsum(np.sin(turned)), np.cumsum(np.cos(turned))
+    rows = zip(np.cos(turned), np.sin(turned), x, z, strict=True)
+    poses.write_text("".join(f"{c} 0 {s} {x} 0 1 0 0 {-s} 0 {c} {z}\n" for c, s, x, z in rows))
+    arguments = ["run", str(poses), "--network", str(drive[1]), "--out", str(tmp_path / "out")]
+    assert main(arguments) == BAD_INPUT and "--fps N" in capsys.readouterr().err
+    assert main([*arguments, "--fps", "10", "--units", "metres"]) == DONE
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["asked"].keys() == {"--fps", "--units", "MAP", "DRIVE"}
+    assert main([*arguments, "--fps", "5"]) == BAD_INPUT
+    assert "another --fps, --units; choose a new --out (the drive is imported already" in capsys.readouterr().err
+
+
+def test_the_unit_said_at_import_reaches_the_refinement(tmp_path, drive, capsys):
+    write_drive(tmp_path / "tum")
+    recording, semi, topo = (str(tmp_path / name) for name in ("recording", "semi.pbstream", "topo.pbstream"))
+    assert main(["import", str(tmp_path / "tum"), "--units", "metres", "--out", recording]) == DONE
+    assert main(["map", recording, "--out", semi]) == DONE
+    capsys.readouterr()
+    assert main(["refine", semi, "--network", str(drive[1]), "--network-accuracy", "1", "--out", topo]) == DONE
+    assert "unit of the odometry: 1 m, as was said when the drive was imported" in capsys.readouterr().out
+    provenance = load_map(Path(topo))[1]
+    assert "metres_per_unit=1.0" in provenance["refine"] and "survey_sigma_m=1.0" in provenance["refine"]
+
+
+def test_a_start_in_another_place_is_refused(drive, finished, tmp_path, capsys):
+    arguments = ["refine", str(finished / "semi.pbstream"), "--network", str(drive[1]), "--out", str(tmp_path / "topo.pbstream")]
+    for start in ("geo:8.4,49.0", "3000,4000,90"):
+        assert main([*arguments, "--start", start]) == BAD_INPUT
+        assert "km from the nearest road" in capsys.readouterr().err
+
+
 def test_a_folder_of_other_things_is_left_alone(drive, tmp_path, capsys):
     (tmp_path / "mine.txt").write_text("mine")
     assert main(["run", str(drive[0]), "--network", str(drive[1]), "--out", str(tmp_path)]) == BAD_INPUT
@@ -111,6 +158,39 @@ def test_a_foreign_layout_is_imported_first(drive, tmp_path, capsys):
     assert "<b>drive" not in (tmp_path / "out" / "drive.html").read_text()
     record = json.loads((tmp_path / "out" / "run.json").read_text())
     assert set(record["stages"]) == {"roads", "import", "map", "refine", "score", "page"}
+
+
+def test_the_page_shows_where_the_map_seems_wrong(drive):
+    refinement, roads = drive_east(bump(5.0)), straight_road(EAST)
+    page = drive_page(
+        Drive(
+            name="<i>monday", network="town.net.xml", recording=open_recording(drive[0]), cognitive_map=refinement.cognitive_map,
+            roads=roads, breaks=(), findings=find_wrong_roads(refinement, roads, SIGMA_M), map_error_m=(0.5, 5.0), reference=None,
+            scores=("mean 1.5 m, 9 of 9 samples: RPE, m; delta 1 sample", "mean 0.3 m, 9 of 9 samples: RPE, m; delta 20 m"),
+            notes=(), stages={"map": 1.0},
+        )
+    )  # fmt: skip
+    assert "over 50 m the road is drawn up to 5.0 m ± 0.8 north of where it was driven" in page and ">A</text>" in page
+    assert "1 place" in page and "x 225 m, y 0 m" in page and "95 % within 5.0 m" in page and "all along this drive" in page
+    assert "0.3 m</strong>" in page and "<i>monday" not in page
+
+
+def test_refine_writes_findings_where_asked(drive, finished, tmp_path, capsys):
+    wanted = ["--network", str(drive[1]), "--findings", str(tmp_path / "found.geojson"), "--out", str(tmp_path / "topo.pbstream")]
+    assert main(["refine", str(finished / "semi.pbstream"), *wanted]) == DONE
+    assert f"{tmp_path / 'found.geojson'}: 0 place(s) where the map seems wrong" in capsys.readouterr().out
+    assert "WGS84 degrees" in json.loads((tmp_path / "found.geojson").read_text())["coordinates"]
+
+
+def test_a_truth_that_comes_once_a_second_is_scored_and_shown(drive, tmp_path, capsys):
+    folder = write_drive(tmp_path / "drive")
+    rows = (folder / "groundtruth.txt").read_text().splitlines(keepends=True)
+    (tmp_path / "seldom.tum").write_text("".join(rows[::10]))
+    arguments = ["run", str(folder), "--truth", str(tmp_path / "seldom.tum"), "--network", str(drive[1])]
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == DONE
+    said = capsys.readouterr().out
+    assert "came without truth" not in said and "APE, position" in said
+    assert 'class="truth"' in (tmp_path / "out" / "drive.html").read_text()
 
 
 def test_refine_converts_a_map_once_and_localize_says_what_was_refused(drive, finished, tmp_path, capsys):

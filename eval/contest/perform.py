@@ -51,6 +51,8 @@ def perform(materials: Materials, entries: Sequence[Entry]) -> Performance:
     """
     with ExitStack() as stack:
         folders = {entry.method.key: Path(stack.enter_context(tempfile.TemporaryDirectory())) for entry in entries}
+        for entry in entries:
+            stack.callback(entry.close)
         drawn = draw_all(materials, entries, folders)
         at_s = scored_times(materials, drawn.get(SEMI_METRIC.key))
         rows, outcomes = [], []

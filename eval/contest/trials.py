@@ -55,6 +55,8 @@ def localizer_of(entry: Entry, materials: Materials) -> Iterator[Localizer]:
     needed = with_bases(entry, entries_of(materials.scenario))
     with ExitStack() as stack:
         folders = {one.method.key: Path(stack.enter_context(tempfile.TemporaryDirectory())) for one in needed}
+        for one in needed:
+            stack.callback(one.close)
         drawn = draw_all(materials, needed, folders)[entry.method.key]
         if isinstance(drawn, str):
             raise MethodError(drawn)
@@ -66,6 +68,8 @@ def map_alone(entry: Entry, materials: Materials) -> tuple[Trajectory, float]:
     needed = with_bases(entry, entries_of(materials.scenario))
     with ExitStack() as stack:
         folders = {one.method.key: Path(stack.enter_context(tempfile.TemporaryDirectory())) for one in needed}
+        for one in needed:
+            stack.callback(one.close)
         drawn = draw_all(materials, needed, folders)[entry.method.key]
     if isinstance(drawn, str):
         raise MethodError(drawn)

@@ -89,6 +89,8 @@ def describe_places(
             found.append(_described(entry, frames, places_m, queries, materials))
         except HippodromeError as error:
             print(f"{scenario.name}: {entry.method.label}: place recognition: {error}", flush=True)
+        finally:
+            entry.close()
     return tuple(found)
 
 

@@ -9,7 +9,7 @@ from pydantic import Field, model_serializer, model_validator
 
 from hippodrome.sim.spec import Spec
 
-Layout = Literal["tum", "euroc", "kitti"]
+Layout = Literal["tum", "euroc", "kitti", "rosbag2", "mcap"]
 
 
 class MethodSpec(Spec):

@@ -9,7 +9,7 @@ from pydantic import Field, model_serializer, model_validator
 
 from hippodrome.sim.spec import Spec
 
-Layout = Literal["tum", "euroc", "kitti"]
+Layout = Literal["tum", "euroc", "kitti", "rosbag2", "mcap"]
 
 
 class MethodSpec(Spec):
@@ -23,8 +23,8 @@ class MethodSpec(Spec):
     frame: Literal["own", "network", "metric"] | None = None  # in which a program answers; None: what a class says, or own
     needs: tuple[Literal["road_network", "start_pose"], ...] = ()  # of a program; a class declares its own
     localize: str | None = None  # command of the same kind for the second drive; {map} stands for what the first call left
-    time_limit_s: Annotated[float, Field(gt=0, le=86_400)] = 3_600.0  # of a program, for each drive
-    memory_limit_mb: Annotated[float, Field(ge=64)] = 8_000.0  # of a program: address space of each of its processes
+    time_limit_s: Annotated[float, Field(gt=0, le=86_400)] = 3_600.0  # for each drive
+    memory_limit_mb: Annotated[float, Field(ge=64)] = 8_000.0  # address space of each of its processes
 
     @model_validator(mode="before")
     @classmethod

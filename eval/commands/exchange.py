@@ -146,6 +146,7 @@ def _add_score(commands: Any) -> None:
         in space are turned level before height, roll and pitch are dropped. Exit status 1: a limit was missed.""",
         ["hippodrome score out/grid/topo.pbstream out/grid/recordings/grid-mapping-*",
          "hippodrome score visual-odometry.tum recordings/kitti-07 --own-frame",
+         "hippodrome score localized.tum out/grid/recordings/grid-localization-* --localization",
          "hippodrome score topo.pbstream recordings/monday --truth phone.gpx --network town.net.xml --max-ape 5"],
     )  # fmt: skip
     score.add_argument(
@@ -156,6 +157,12 @@ def _add_score(commands: Any) -> None:
     score.add_argument(
         "--own-frame", action="store_true",
         help="the trajectory has a frame and a scale of its own: align it in several ways and print the errors of each",
+    )  # fmt: skip
+    score.add_argument(
+        "--localization", action="store_true",
+        help="the trajectory is a localizer's of a second drive, in the road network's frame: print whether and when it was "
+             "localized, its error from then on, and its false fixes; a ninth column, 1 or 0, says which poses it stands by "
+             "(default: a mapper's trajectory; without the column: it stands by all)",
     )  # fmt: skip
     score.add_argument(
         "--axes", choices=["body", "camera"],
@@ -303,7 +310,7 @@ def _score(options: argparse.Namespace) -> int:
         ScoreOptions(
             options.estimate, options.recording, not options.own_frame, options.axes, options.times, options.clock, options.truth,
             options.network, options.truth_sigma, options.time_offset, options.max_gap, options.json, options.max_ape,
-            options.max_rpe, options.camera_ahead, options.truth_ahead,
+            options.max_rpe, options.camera_ahead, options.truth_ahead, options.localization,
         )
     )  # fmt: skip
     return DONE if held else THRESHOLD_FAILED

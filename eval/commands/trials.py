@@ -9,6 +9,7 @@ from typing import Any
 from hippodrome.eval.commands.arguments import (
     DONE,
     add_command,
+    add_methods,
     add_out,
     add_workers,
     localizer_mode,
@@ -54,6 +55,7 @@ def add_trial_commands(commands: Any) -> None:
         help="run this case only; may be given several times (default: all cases). There are: "
              + "; ".join(CASES).replace("%", "%%"),
     )  # fmt: skip
+    add_methods(stress)
     add_workers(stress)
     add_out(stress, "out/stress")
 
@@ -95,6 +97,7 @@ def add_trial_commands(commands: Any) -> None:
              "kalman: a Kalman filter; lanes: a Bayes filter on lanes; paper: the equations as printed (default: all; "
              "'default', the former name of coupled, goes on working)",
     )  # fmt: skip
+    add_methods(robust)
     add_workers(robust)
     add_out(robust, "out/robustness")
 
@@ -125,6 +128,7 @@ def add_trial_commands(commands: Any) -> None:
     baselines.add_argument(
         "--paced", action="store_true", help="feed frames at the camera's rate (default: as fast as ORB-SLAM3 takes them)"
     )
+    add_methods(baselines)
     add_workers(baselines)
     add_out(baselines, "out/baselines")
 
@@ -132,7 +136,7 @@ def add_trial_commands(commands: Any) -> None:
 def _stress(options: argparse.Namespace) -> int:
     from hippodrome.eval.trials.stress.run import stress
 
-    stress(options.scenarios, options.seeds, options.cases, options.workers, options.out)
+    stress(options.scenarios, options.seeds, options.cases, options.workers, options.out, options.method)
     return DONE
 
 
@@ -148,6 +152,7 @@ def _robustness(options: argparse.Namespace) -> int:
             modes=list(dict.fromkeys(["coupled", *options.modes])),
             workers=options.workers,
             out=options.out,
+            methods=options.method,
         )
     )
     return DONE
@@ -158,5 +163,5 @@ def _baselines(options: argparse.Namespace) -> int:
 
     limit_s = None if options.time_limit is None else 60.0 * options.time_limit
     wanted = options.scenario, options.out, options.runs, options.workers, options.seconds, options.paced, limit_s
-    run_baselines(BaselineOptions(*wanted))
+    run_baselines(BaselineOptions(*wanted, methods=options.method))
     return DONE

@@ -13,6 +13,7 @@ import numpy as np
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.contest.entry import BUILT_IN, GROUP, Added, Entry, entries_of, with_methods
 from hippodrome.eval.contest.perform import Performance, perform
+from hippodrome.eval.contest.trials import with_bases
 from hippodrome.eval.methods.materials import Materials, Outcome, gather
 from hippodrome.eval.methods.method import ALIGNMENTS
 from hippodrome.eval.methods.protocol import MethodError
@@ -74,7 +75,7 @@ def check(wanted: str | Added, out: Path) -> Iterator[Finding]:
         record(RecordingPlan(scenario, role, out))
     warm_up()
     materials = gather(scenario, out)
-    once, again = (perform(materials, [*_bases(entry, entries), entry]) for _ in range(2))
+    once, again = (perform(materials, with_bases(entry, entries)) for _ in range(2))
     yield from findings(entry, materials, once, again)
 
 
@@ -175,12 +176,3 @@ def _ours(name: str, entries: Sequence[Entry]) -> Entry:
         if name in (entry.method.key, entry.method.label):
             return entry
     raise MethodError(f"there is no method '{name}'; `hippodrome method list` says which there are")
-
-
-def _bases(entry: Entry, entries: Sequence[Entry]) -> list[Entry]:
-    """What the method builds on, the lowest first, if it is not itself on the way."""
-    found: list[Entry] = []
-    while entry.builds_on is not None and len(found) < len(entries):
-        entry = next(other for other in entries if other.method.key == entry.builds_on)
-        found.insert(0, entry)
-    return found

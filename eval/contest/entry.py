@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import importlib
 import re
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
+from hippodrome.eval.contest.apart import Apart, apart
+from hippodrome.eval.contest.loading import load_class, made_of, require_config
 from hippodrome.eval.contest.process import can_conceal
 from hippodrome.eval.contest.program import ProgramLocalizer, ProgramMapper
 from hippodrome.eval.contest.stream import StreamLocalizer, StreamMapper
@@ -39,6 +39,11 @@ class Entry:
     builds_on: str | None = None  # key of the method on whose map it builds
     source: str = "hippodrome"  # where it comes from, for the report
     apart: bool = False  # whether it runs in a process of its own
+
+    def close(self) -> None:
+        """End the process of its own, if it has one that still runs."""
+        if isinstance(self.runner, Apart):
+            self.runner.close()
 
     @property
     def declaration(self) -> Declaration:
@@ -108,33 +113,11 @@ def entries_of(scenario: Scenario) -> list[Entry]:
     Raises:
         MethodError: A method cannot be loaded, or two have one name.
     """
-    ours = [_entry_of(cls, cls.card, _made(cls, {}, scenario, cls.card.label), "hippodrome") for cls in BUILT_IN]
+    ours = [_entry_of(cls, cls.card, made_of(cls, {}, scenario, cls.card.label), "hippodrome") for cls in BUILT_IN]
     theirs = [_foreign(name, spec, scenario) for name, spec in scenario.methods.items()]
     entries = [*ours, *theirs]
     _require_names(entries)
     return entries
-
-
-def load_class(reference: str) -> type[Any]:
-    """The class of ``module:Class``; the working directory is searched as well. Raises MethodError."""
-    module_name, _, class_name = reference.partition(":")
-    if str(Path.cwd()) not in sys.path:
-        sys.path.append(str(Path.cwd()))
-    try:
-        found: Any = importlib.import_module(module_name)
-        for part in class_name.split("."):
-            found = getattr(found, part)
-    except ModuleNotFoundError as error:
-        raise MethodError(
-            f"method {reference}: there is no module '{error.name}'; install it, or run in the folder that has it"
-        ) from None
-    except AttributeError:
-        raise MethodError(f"method {reference}: the module has no '{class_name}'") from None
-    except Exception as error:
-        raise MethodError(f"method {reference}: importing it failed: {type(error).__name__}: {error}") from error
-    if not isinstance(found, type):
-        raise MethodError(f"method {reference}: '{class_name}' is a {type(found).__name__}, not a class")
-    return found
 
 
 def _foreign(name: str, spec: MethodSpec, scenario: Scenario) -> Entry:
@@ -143,7 +126,8 @@ def _foreign(name: str, spec: MethodSpec, scenario: Scenario) -> Entry:
         return _program(name, spec)
     cls = load_class(spec.class_)
     method = _card(name, str(spec.frame or getattr(cls, "frame", "own")))
-    return _entry_of(cls, method, _made(cls, spec.config, scenario, method.label), spec.class_)
+    require_config(cls, spec.config, method.label)
+    return _entry_of(cls, method, apart(cls, method.label, spec), spec.class_)
 
 
 def _program(name: str, spec: MethodSpec) -> Entry:
@@ -173,23 +157,6 @@ def _entry_of(cls: type[Any], method: Method, runner: Any, source: str) -> Entry
     if not entry.does:
         raise MethodError(f"method {method.label}: it has none of the functions map, localize and describe")
     return entry
-
-
-def _made(cls: type[Any], config: dict[str, Any], scenario: Scenario, label: str) -> Any:
-    """An object of a method's class: from the whole scenario, from a configuration of its own, or from nothing."""
-    try:
-        if hasattr(cls, "of_scenario"):
-            return cls.of_scenario(scenario)
-        own = getattr(cls, "Config", None)
-        if isinstance(own, type) and issubclass(own, BaseModel):
-            return cls(own.model_validate(config))
-        return cls(**config)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise MethodError(f"method {label}: config.{place}: {first['msg']}") from None
-    except Exception as error:
-        raise MethodError(f"method {label}: it cannot be made: {type(error).__name__}: {error}") from error
 
 
 def _require_names(entries: Iterable[Entry]) -> None:

@@ -5,15 +5,25 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.methods.materials import Materials
 from hippodrome.eval.methods.protocol import MethodError
+
+if TYPE_CHECKING:
+    from hippodrome.eval.methods.materials import Materials
 
 ResultT = TypeVar("ResultT")
 INTERRUPTED: Final = 130  # exit status of a worker that is interrupted, which is no fault of the method
+
+
+class Crashed(Exception):
+    """A method that raised something in a process of its own."""
+
+    def __init__(self, cause: str, trace: str) -> None:
+        super().__init__(cause)
+        self.cause, self.trace = cause, trace
 
 
 def guarded(label: str, function: Callable[[], ResultT], materials: Materials) -> ResultT:
@@ -27,9 +37,15 @@ def guarded(label: str, function: Callable[[], ResultT], materials: Materials) -
             raise
         raise MethodError(f"it left the process with status {error.code}") from error
     except BaseException as error:
+        cause, trace = (error.cause, error.trace) if isinstance(error, Crashed) else crash_of(error)
         log = materials.folder / f"{label.replace(' ', '-')}-crash.txt"
-        write_atomically(log, traceback.format_exc().encode())
-        last = traceback.extract_tb(error.__traceback__)[-1]
-        text = " ".join(str(error).split())[:200]
-        place = f"{Path(last.filename).name}, line {last.lineno}"
-        raise MethodError(f"crashed: {type(error).__name__}: {text} ({place}); its traceback is in {log.name}") from error
+        write_atomically(log, trace.encode())
+        raise MethodError(f"{cause}; its traceback is in {log.name}") from error
+
+
+def crash_of(error: BaseException) -> tuple[str, str]:
+    """What was raised and where, in one line, and the whole traceback."""
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    text = " ".join(str(error).split())[:200]
+    trace = "".join(traceback.format_exception(error))
+    return f"crashed: {type(error).__name__}: {text} ({Path(last.filename).name}, line {last.lineno})", trace

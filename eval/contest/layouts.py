@@ -12,6 +12,7 @@ import cv2
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import Frame, HippodromeError, Observation
+from hippodrome.eval.contest.bags import Mcap, Rosbag2
 from hippodrome.eval.methods.protocol import Given
 from hippodrome.sim.method_spec import Layout
 from hippodrome.sim.recording import PNG_LEVEL
@@ -40,6 +41,7 @@ def write_sequence(observations: Iterable[Observation], given: Given, layout: La
         for one in observations:
             odometry.write(f"{one.t_s!r},{one.speed!r},{one.yaw_rate_radps!r}\n")
             times_s.append(one.t_s)
+            frames.motion(one)
             if one.frame is not None:
                 frames.add(one.t_s, one.frame)
     camera = given.camera
@@ -83,6 +85,9 @@ class _Frames:
         self._open.append(stream)
         return stream
 
+    def motion(self, one: Observation) -> None:
+        """Speed and yaw rate, for the layouts that have them beside the frames; ``odometry.csv`` has them for all."""
+
     def add(self, t_s: float, frame: Frame) -> None:
         raise NotImplementedError
 
@@ -123,13 +128,43 @@ class _Kitti(_Frames):
         self.count += 1
 
 
-_FRAMES: Final[dict[Layout, Callable[[Path], _Frames]]] = {"tum": _Tum, "euroc": _Euroc, "kitti": _Kitti}
+class _Bag(_Frames):
+    """Frames and self-motion as messages."""
+
+    def __init__(self, bag: Rosbag2 | Mcap) -> None:
+        self._bag = bag
+
+    def __enter__(self) -> _Bag:
+        self._bag.__enter__()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bag.__exit__()
+
+    def motion(self, one: Observation) -> None:
+        self._bag.motion(one)
+
+    def add(self, t_s: float, frame: Frame) -> None:
+        self._bag.picture(t_s, _png(frame))
+
+
+_FRAMES: Final[dict[Layout, Callable[[Path], _Frames]]] = {
+    "tum": _Tum,
+    "euroc": _Euroc,
+    "kitti": _Kitti,
+    "rosbag2": lambda folder: _Bag(Rosbag2(folder)),
+    "mcap": lambda folder: _Bag(Mcap(folder)),
+}
 
 
 def _write_png(path: Path, frame: Frame) -> None:
+    path.write_bytes(_png(frame))
+
+
+def _png(frame: Frame) -> bytes:
     image = frame if frame.ndim == 2 else frame[:, :, ::-1]
     _, png = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, PNG_LEVEL])
-    path.write_bytes(png.tobytes())
+    return png.tobytes()
 
 
 def _write_roads(path: Path, roads: RoadNetwork) -> None:

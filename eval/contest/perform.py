@@ -10,54 +10,29 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from time import process_time
 from typing import Final
 
 import numpy as np
 
 from hippodrome.core.se2 import interpolate
-from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, Trajectory
+from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
+from hippodrome.eval.contest.calls import Drawn, draw_all, localize
 from hippodrome.eval.contest.entry import Entry
 from hippodrome.eval.contest.guard import guarded
 from hippodrome.eval.contest.places import recognise
-from hippodrome.eval.methods.feed import Feed
-from hippodrome.eval.methods.materials import Materials, Outcome, score_trajectory, true_start
+from hippodrome.eval.methods.materials import Materials, Outcome, score_trajectory
 from hippodrome.eval.methods.method import SEMI_METRIC
 from hippodrome.eval.methods.protocol import (
-    Cost,
-    Given,
-    Localized,
     Localizes,
-    Localizing,
-    Mapped,
-    Maps,
     MethodError,
-    as_estimate,
-    as_mapped,
 )
-from hippodrome.eval.methods.stages import Localization
-from hippodrome.eval.metrics.association import check_trajectory
 from hippodrome.eval.metrics.localization import score_localization
 from hippodrome.eval.metrics.trajectory import path_length_m
 from hippodrome.eval.results.model import PlaceSummary, Row
 from hippodrome.eval.results.rows import latency, row_of
-from hippodrome.proto.codec import save_map
-from hippodrome.sim.recording import Recording
-from hippodrome.sim.render.camera import CameraSpec
 
 SPACING_M: Final = 5.0  # between two scored samples where there is no semi-metric map: as far apart as its vertices are
 LEAST_COVERED: Final = 0.5  # share of the drive that a trajectory must cover: with less, its errors say little about the drive
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Drawn:
-    """The map that a method made of the first drive, and what that took."""
-
-    mapped: Mapped
-    cpu_s: float  # of its map alone
-    whole_s: float  # with the map that it builds on
-    step_s: FloatArray
-    map_bytes: int | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,17 +51,10 @@ def perform(materials: Materials, entries: Sequence[Entry]) -> Performance:
     """
     with ExitStack() as stack:
         folders = {entry.method.key: Path(stack.enter_context(tempfile.TemporaryDirectory())) for entry in entries}
-        drawn: dict[str, Drawn | str] = {}
-        for entry in _bases_first(entries):
-            if entry.does == ("describe",):
-                continue
-            try:
-                drawn[entry.method.key] = _draw(entry, materials, drawn, folders[entry.method.key])
-            except HippodromeError as error:
-                if entry.method == SEMI_METRIC and all(other.source == "hippodrome" for other in entries):
-                    raise
-                drawn[entry.method.key] = str(error)
-        at_s = _scored_times(materials, drawn.get(SEMI_METRIC.key))
+        for entry in entries:
+            stack.callback(entry.close)
+        drawn = draw_all(materials, entries, folders)
+        at_s = scored_times(materials, drawn.get(SEMI_METRIC.key))
         rows, outcomes = [], []
         for entry in entries:
             if entry.does == ("describe",):
@@ -128,81 +96,7 @@ def _places(entry: Entry, materials: Materials) -> PlaceSummary | None:
     return PlaceSummary(**asdict(guarded(label, lambda: recognise(label, entry.runner.describe, materials), materials)[0]))
 
 
-def _bases_first(entries: Sequence[Entry]) -> list[Entry]:
-    """The entries, those that others build on before these. A method that builds on itself comes last, and fails there."""
-    by_key = {entry.method.key: entry for entry in entries}
-
-    def depth(entry: Entry) -> int:
-        found, steps = entry, 0
-        while found.builds_on is not None and steps <= len(entries):
-            found, steps = by_key[found.builds_on], steps + 1
-        return steps
-
-    return sorted(entries, key=depth)
-
-
-def _draw(entry: Entry, materials: Materials, drawn: Mapping[str, Drawn | str], folder: Path) -> Drawn:
-    """The method's map of the first drive. Raises HippodromeError if there is none."""
-    label, base = entry.method.label, None
-    if entry.builds_on is not None:
-        found = drawn.get(entry.builds_on, "it was not run")
-        if isinstance(found, str):
-            raise MethodError(f"builds on {entry.builds_on}, which failed: {found}")
-        base = found
-    if not isinstance(entry.runner, Maps):
-        if base is None:
-            raise MethodError("it makes no map, and builds on none")
-        return replace(base, cpu_s=0.0, whole_s=base.whole_s, step_s=np.zeros(0), map_bytes=None)
-    given = _given(entry, materials, materials.mapping, folder, base.mapped if base else None)
-    if (warm_up := getattr(entry.runner, "warm_up", None)) is not None:
-        guarded(label, warm_up, materials)
-    feed = Feed(materials.mapping.observations() if entry.needs.camera else materials.mapping.self_motion())
-    began = process_time()
-    mapped = guarded(label, lambda: as_mapped(entry.runner.map(iter(feed), given), label), materials)
-    cpu_s = process_time() - began - feed.decoding_s
-    feed.settle()
-    check_trajectory(mapped.trajectory, label)
-    map_bytes = guarded(label, lambda: _save(entry, mapped, materials), materials)
-    step_s = feed.step_s
-    if (cost := mapped.cost) is not None:
-        cpu_s, step_s = cost.cpu_s, np.zeros(0) if cost.step_s is None else cost.step_s
-    return Drawn(mapped, cpu_s, cpu_s + (base.whole_s if base else 0.0), step_s, map_bytes)
-
-
-def _save(entry: Entry, mapped: Mapped, materials: Materials) -> int | None:
-    """Write the map into the scenario's folder; its size in bytes, or None if the method keeps no map."""
-    if entry.method.map_file is None:
-        return None
-    path = entry.method.map_path(materials.folder)
-    if mapped.save is not None:
-        return mapped.save(path)
-    if mapped.cognitive_map is not None:
-        return save_map(path, mapped.cognitive_map, materials.provenance(entry.method))
-    return None
-
-
-def _given(entry: Entry, materials: Materials, drive: Recording, folder: Path, base: Mapped | None) -> Given:
-    scenario, needs = materials.scenario, entry.needs
-    return Given(
-        camera=_camera(scenario.camera, drive),
-        rate_hz=scenario.odometry_rate_hz,
-        duration_s=float(drive.samples.t_s[-1]),
-        seed=scenario.seed,
-        folder=folder,
-        roads=materials.roads if needs.road_network else None,
-        start=true_start(drive) if needs.start_pose and drive is materials.mapping else None,
-        base=base,
-        concealed=tuple(folder for folder in materials.truth_folders if folder.is_dir()),
-    )
-
-
-def _camera(camera: CameraSpec, drive: Recording) -> CameraSpec:
-    """The camera of a drive: the scenario's, or what is known of that of a drive that was recorded elsewhere."""
-    known = getattr(drive, "manifest", {}).get("camera", {})
-    return camera.model_copy(update={name: value for name, value in known.items() if name in CameraSpec.model_fields})
-
-
-def _scored_times(materials: Materials, semi_metric: Drawn | str | None) -> FloatArray:
+def scored_times(materials: Materials, semi_metric: Drawn | str | None) -> FloatArray:
     """Times (N,) at which trajectories are scored: those of the semi-metric map's vertices, or else one every ``SPACING_M``."""
     if isinstance(semi_metric, Drawn):
         return semi_metric.mapped.trajectory.t_s
@@ -217,7 +111,7 @@ def _outcome(entry: Entry, materials: Materials, drawn: Drawn | str, at_s: Float
     if isinstance(drawn, str):
         raise MethodError(drawn)
     method, truth = entry.method, materials.mapping.ground_truth()
-    trajectory, covered = _sampled(drawn.mapped.trajectory, at_s)
+    trajectory, covered = sampled(drawn.mapped.trajectory, at_s)
     outcome = Outcome(
         method=method,
         mapped=drawn.mapped,
@@ -232,14 +126,14 @@ def _outcome(entry: Entry, materials: Materials, drawn: Drawn | str, at_s: Float
     if not isinstance(entry.runner, Localizes):
         return outcome
     try:
-        localization = _localize(entry, materials, drawn.mapped, folder)
+        localization = localize(entry, materials, drawn.mapped, folder, materials.drive)
         localized = score_localization(localization.estimates, materials.drive.ground_truth(), localization.step_s)
     except HippodromeError as error:
         return replace(outcome, failure=f"localization: {error}")
     return replace(outcome, localization=localization, localized=localized)
 
 
-def _sampled(trajectory: Trajectory, at_s: FloatArray) -> tuple[Trajectory, float]:
+def sampled(trajectory: Trajectory, at_s: FloatArray) -> tuple[Trajectory, float]:
     """The trajectory at the times ``at_s`` (N,) between its ends, linear between its poses, and the share of times that is.
 
     Raises:
@@ -255,30 +149,6 @@ def _sampled(trajectory: Trajectory, at_s: FloatArray) -> tuple[Trajectory, floa
             f"of the drive, from {at_s[0]:.1f} s to {at_s[-1]:.1f} s; at least {LEAST_COVERED:.0%} is needed"
         )
     return Trajectory(within, interpolate(trajectory.t_s, trajectory.poses, within)), covered
-
-
-def _localize(entry: Entry, materials: Materials, mapped: Mapped, folder: Path) -> Localization:
-    """The second drive localized, from an unknown start. Raises HippodromeError."""
-    label, drive = entry.method.label, materials.drive
-    given = replace(_given(entry, materials, drive, folder, None), mapped=mapped)
-    feed = Feed(drive.observations() if entry.needs.camera else drive.self_motion())
-    estimates, cost = guarded(label, lambda: _answers(label, entry.runner.localize(iter(feed), given)), materials)
-    feed.settle()
-    times_s = drive.samples.t_s
-    if len(estimates) != len(times_s):
-        raise MethodError(f"{len(estimates)} answers to {len(times_s)} observations; one for each is expected, in their order")
-    if not np.allclose([estimate.t_s for estimate in estimates], times_s, rtol=0.0, atol=1e-6):
-        raise MethodError("its answers have other times than the observations; answer each with its own t_s")
-    if cost is None:
-        return Localization(estimates, feed.step_cpu_s)
-    return Localization(estimates, np.full(len(times_s), cost.cpu_s / len(times_s)) if cost.step_s is None else cost.step_s)
-
-
-def _answers(label: str, answers: Localizing) -> tuple[list[LocalizationEstimate], Cost | None]:
-    """What ``localize`` gave, answer by answer; a method that yields them does its work here."""
-    if isinstance(answers, Localized):
-        return [as_estimate(answer, label) for answer in answers.answers], answers.cost
-    return [as_estimate(answer, label) for answer in answers], None
 
 
 def _failed(entry: Entry, drawn: Mapping[str, Drawn | str], cause: str) -> Row:

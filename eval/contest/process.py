@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import IO, Final
 
 from hippodrome.eval.methods.protocol import MethodError
+from hippodrome.sim.method_spec import MethodSpec
 
+MEGABYTE: Final = 1_000_000
 POLL_S: Final = 0.05  # between two looks at a process: its memory is looked at as well
 FILE_BYTES: Final = 4 << 30  # the longest file that a program may write, its printed text included
 LAST_WORDS: Final = 300  # characters of what a program printed last that an error quotes
@@ -30,6 +32,11 @@ class Limits:
 
     time_s: float
     memory_bytes: int  # address space of each process, and memory of all of them together
+
+    @classmethod
+    def of(cls, spec: MethodSpec) -> Limits:
+        """Those that a scenario sets for a method."""
+        return cls(spec.time_limit_s, round(spec.memory_limit_mb * MEGABYTE))
 
 
 @dataclass(slots=True)

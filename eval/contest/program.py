@@ -16,7 +16,6 @@ from hippodrome.eval.methods.protocol import Answer, Cost, Given, Localized, Map
 from hippodrome.sim.method_spec import MethodSpec
 
 TRAJECTORY: Final = "trajectory.tum"  # that a program leaves in its folder {out}
-MEGABYTE: Final = 1_000_000
 
 
 class ProgramMapper:
@@ -49,15 +48,10 @@ class ProgramLocalizer(ProgramMapper):
         return Localized(answers_at(times_s, read_answer(out, process)), cost)
 
 
-def limits_of(spec: MethodSpec) -> Limits:
-    """The limits of a program."""
-    return Limits(spec.time_limit_s, round(spec.memory_limit_mb * MEGABYTE))
-
-
 def run_program(spec: MethodSpec, words: list[str], out: Path, given: Given) -> Process:
     """Run a program to its end. Raises MethodError if it did not end well."""
     out.mkdir(parents=True, exist_ok=True)
-    with started(words, given.folder, limits_of(spec), given.concealed) as process:
+    with started(words, given.folder, Limits.of(spec), given.concealed) as process:
         process.wait()
     return process
 

@@ -14,8 +14,7 @@ from google.protobuf.message import DecodeError
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import Observation, Trajectory
-from hippodrome.eval.contest.process import POLL_S, Process, command_words, last_words, started
-from hippodrome.eval.contest.program import limits_of
+from hippodrome.eval.contest.process import POLL_S, Limits, Process, command_words, last_words, started
 from hippodrome.eval.methods.protocol import Answer, Cost, Given, Localized, Mapped, MethodError
 from hippodrome.proto import method_stream_pb2 as pb
 from hippodrome.sim.method_spec import MethodSpec
@@ -53,7 +52,7 @@ class StreamMapper:
         folder = given.folder / "kept"
         folder.mkdir(exist_ok=True)
         times_s, answers, steps_s = [], [], []
-        with started(command_words(command), given.folder, limits_of(self._spec), given.concealed, fed=True) as process:
+        with started(command_words(command), given.folder, Limits.of(self._spec), given.concealed, fed=True) as process:
             line = _Line(process)
             ready = line.asked(pb.ToMethod(begin=_begin(phase, given, folder)), "ready").ready
             if ready.version != VERSION:

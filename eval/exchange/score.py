@@ -15,6 +15,8 @@ from hippodrome.core.types import HippodromeError, Trajectory
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.lever import Ahead, at_axle
 from hippodrome.eval.exchange.drives.truth import Truth, read_truth, stored_truth
+from hippodrome.eval.exchange.score_localized import NOT_THE_NETWORKS, declared_poses, say, score_declared
+from hippodrome.eval.exchange.score_localized import write_json as write_localization
 from hippodrome.eval.files.spatial import Axes, SpatialPoses, flatten, is_own, read_poses
 from hippodrome.eval.methods.materials import RPE_DELTA_M
 from hippodrome.eval.methods.refusal import refusal_note
@@ -53,6 +55,7 @@ class ScoreOptions:
     max_rpe_m: float | None = None
     camera_ahead: float | None = None  # of the trajectory's poses before the rear axle; None: they are of the truth's point
     truth_ahead: Ahead = "auto"  # of the poses of ``truth``
+    localization: bool = False  # whether the trajectory is a localizer's of a second drive
 
 
 @dataclass(slots=True)
@@ -94,6 +97,15 @@ def score_files(options: ScoreOptions) -> bool:
     sheet = _Sheet()
     truth, same_world = _truth(options, drive, sheet)
     truth = _of_its_point(options, truth, sheet)
+    if options.localization:
+        if not same_world:
+            raise ExchangeError(f"{options.recording}: {NOT_THE_NETWORKS}")
+        source = options.clock == "source" or (options.clock == "auto" and not is_own(options.estimate))
+        declared = declared_poses(options.estimate, -_origin_s(drive) if source else 0.0, options.camera_ahead or 0.0)
+        score = score_declared(declared, truth.trajectory, drive, options.max_gap_s or MAX_GAP_S)
+        if options.json_file is not None:
+            write_localization(options.json_file, options.estimate, drive, score, declared)
+        return say(score, declared, options.max_ape_m)
     trajectory, metric, clause = _estimate(options, drive, truth, same_world, sheet)
     at, max_gap_s = _instants(trajectory, truth.trajectory, options.max_gap_s)
 

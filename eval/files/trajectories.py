@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hippodrome._files import write_atomically
 from hippodrome.core.types import FloatArray, Trajectory
@@ -12,6 +14,7 @@ from hippodrome.eval.metrics.association import TrajectoryError, check_trajector
 
 MAX_BYTES = 256 << 20  # about two million poses
 COLUMNS = 8
+FLAGS: Final = {"1": True, "0": False, "true": True, "false": False, "True": True, "False": False}
 HEAD = "# t_s x y z qx qy qz qw"  # the first line of what we write: its times are the recording's, not those of a foreign drive
 
 
@@ -30,17 +33,54 @@ def write_tum(path: Path, trajectory: Trajectory) -> None:
 
 def read_tum(path: Path) -> Trajectory:
     """Read a trajectory; z, roll and pitch are dropped. Raises TrajectoryError, which names the file and the line."""
+    return _trajectory(path, [_row(path, number, line) for number, line in _lines(path)])
+
+
+def read_tum_declared(path: Path) -> tuple[Trajectory, NDArray[np.bool_]] | None:
+    """Read a localizer's poses with a ninth column, ``localized``: whether it stands by each. None if there is no such column.
+
+    Lines with 0 there need no meaningful pose, and theirs is that of the line before with 1.
+
+    Raises:
+        TrajectoryError: It is no such file, or no line has 1.
+    """
+    lines = _lines(path)
+    if not lines or len(lines[0][1].split()) != COLUMNS + 1:
+        return None
+    split = [(number, *line.rpartition(line.split()[-1])[::2], line.split()[-1]) for number, line in lines]
+    for number, _, _, flag in split:
+        if flag not in FLAGS:
+            raise TrajectoryError(f"{path}: line {number}: '{flag}' in the column 'localized' is none of {', '.join(FLAGS)}")
+    known = np.array([FLAGS[flag] for *_, flag in split], dtype=np.bool_)
+    rows: list[list[float]] = []
+    last = next((_row(path, number, line) for number, line, _, flag in split if FLAGS[flag]), None)
+    if last is None:
+        raise TrajectoryError(f"{path}: the column 'localized' is 0 everywhere, so there is nothing to score")
+    for number, line, _, flag in split:
+        last = _row(path, number, line) if FLAGS[flag] else [_time(path, number, line), *last[1:]]
+        rows.append(last)
+    return _trajectory(path, rows), known
+
+
+def _lines(path: Path) -> list[tuple[int, str]]:
+    """The lines with poses and their numbers. Raises TrajectoryError."""
     try:
         if (size := path.stat().st_size) > MAX_BYTES:
             raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise TrajectoryError(f"{path}: cannot be read as text: {error}") from error
-    rows = [
-        _row(path, number, line)
-        for number, line in enumerate(lines, start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    return [(number, one) for number, one in enumerate(lines, start=1) if one.strip() and not one.lstrip().startswith("#")]
+
+
+def _time(path: Path, number: int, line: str) -> float:
+    try:
+        return float(line.split()[0])
+    except (ValueError, IndexError) as error:
+        raise TrajectoryError(f"{path}: line {number}: {error}") from error
+
+
+def _trajectory(path: Path, rows: list[list[float]]) -> Trajectory:
     if not rows:
         raise TrajectoryError(f"{path}: no poses")
     table = np.array(rows)

@@ -51,7 +51,7 @@ GIVEN: Final[dict[str, tuple[str, str, str]]] = {
 
 
 FRAMES: Final = {"own": "start pose, no scale", "network": "network, no alignment", "metric": "best rigid fit, SE(2)"}
-TRUSTED: Final = "a class in our own process, trusted not to look for the truth"
+TRUSTED: Final = "a class, trusted not to look for the truth"
 APART: Final = "a process of its own, trusted not to look for the truth: this system cannot hide it"
 ISOLATED: Final = "a process of its own, with nothing of the truth within its reach"
 

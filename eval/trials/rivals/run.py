@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from hippodrome._files import write_atomically
+from hippodrome.eval.contest.entry import Added
+from hippodrome.eval.contest.trials import localize_added
 from hippodrome.eval.methods.materials import gather
 from hippodrome.eval.pool import Workers, worker_pool
 from hippodrome.eval.report.report import REPORT, write_report
 from hippodrome.eval.results.model import Results, Row, ScenarioResult, read_results, to_json, write_results
-from hippodrome.eval.results.paper_rows import quoted_rows
+from hippodrome.eval.results.paper_rows import SEQUENCE_LENGTH_M, quoted_rows
 from hippodrome.eval.results.ratios import RATIOS, ratio_lines, ratios
 from hippodrome.eval.results.table_two import LocalizedSequence, write_table_two
 from hippodrome.eval.results.tables import failed_runs, print_table_one, table_one_markdown
@@ -37,6 +40,7 @@ class BaselineOptions:
     seconds: float | None  # a quick look: ORB-SLAM3 alone, on the first seconds of the drive
     paced: bool  # feed frames at the camera's rate, not as fast as they are taken
     limit_s: float | None  # time that a run of ORB-SLAM3 may take; None: by its number of frames
+    methods: Sequence[Added] = ()  # that take part beside those that the scenario names
 
 
 def run_baselines(options: BaselineOptions) -> None:
@@ -45,11 +49,11 @@ def run_baselines(options: BaselineOptions) -> None:
     Raises:
         HippodromeError: The scenario cannot be used, or asks for too few frames.
     """
-    scenario, out = load_scenarios([options.scenario], None, None)[0], options.out
+    scenario, out = load_scenarios([options.scenario], None, None, options.methods)[0], options.out
     require_gl()
     whole = options.seconds is None
     if whole:
-        evaluate([options.scenario], None, None, options.workers, out)
+        evaluate([options.scenario], None, None, options.workers, out, options.methods)
     with worker_pool(options.workers) as pool:
         tracked = track(scenario, out, TrackerOptions(options.runs, options.seconds, options.paced, options.limit_s), pool)
         write_atomically(out / ORBSLAM3_RESULTS, to_json([row.model_dump(mode="python") for row in tracked.rows]).encode())
@@ -65,7 +69,8 @@ def _complete(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) ->
     materials = gather(scenario, out)
     results = _joined(read_results(out / RESULTS), tracked.rows)
     results = with_peak_rss(results, scenario, out, pool)
-    found: list[LocalizedSequence] = [*localize_sequences(materials), *locate(scenario, out, tracked, pool)]
+    added = localize_added(materials, SEQUENCE_LENGTH_M)
+    found: list[LocalizedSequence] = [*localize_sequences(materials), *added, *locate(scenario, out, tracked, pool)]
     write_results(out / RESULTS, results)
     write_atomically(out / "table1.md", table_one_markdown(results, quoted_rows()).encode())
     write_table_two(out, scenario.name, [one.row for one in found])

@@ -107,6 +107,8 @@ CONDITIONS: Final[dict[str, Change]] = {
     "self-motion-visual": _visual,
 }
 
+OURS_ALONE: Final = frozenset({"self-motion-visual"})  # changes a setting of our localizer, and nothing that others are given
+
 
 def chosen(names: Sequence[str] | None) -> list[str]:
     """The named conditions in the order of ``CONDITIONS``, all of them if ``names`` is None. Raises HippodromeError."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -33,12 +33,13 @@ class Failure:
 class Findings:
     """All that one run of the command found in one town."""
 
-    results: Sequence[ConditionResult]  # by mode, then by condition; the last one is the coupled mode's in another town
+    results: Sequence[ConditionResult]  # by mode, then by condition; then the coupled mode's in another town; then other methods'
     places: Sequence[PlaceResult]  # by condition
     kidnapped: dict[str, tuple[Kidnapping, ...]]  # by condition
     paper: tuple[PaperSequence, ...]
     map_bytes: int  # size of the map's file
     views: int  # distinct views in the map
+    failed: dict[str, str] = field(default_factory=dict)  # labels of methods beside ours that failed, and why
 
     @property
     def bytes_per_view(self) -> float:
@@ -52,7 +53,11 @@ class Findings:
     @property
     def table(self) -> list[ConditionResult]:
         """The rows of the first table: the main mode's results in the mapped town, then those in another town."""
-        return [*self.conditions, *(result for result in self.results if result.name == ELSEWHERE)]
+        return [*self.conditions, *(one for one in self.results if one.name == ELSEWHERE and one.mode == MAIN_MODE)]
+
+    def of(self, other: ConditionResult) -> ConditionResult:
+        """The result of the same mode or method under the same condition."""
+        return next(one for one in self.results if (one.mode, one.name) == (other.mode, other.name))
 
     def summary(self) -> dict[str, Any]:
         """Every figure as plain data."""
@@ -64,6 +69,7 @@ class Findings:
             "kidnapping_all": kidnapping_summary(kidnappings),
             "paper_lengths": {**paper_summary(self.paper), "sequences_run": [paper_record(one) for one in self.paper]},
             "bytes_per_view": self.bytes_per_view,
+            **({"failed_methods": self.failed} if self.failed else {}),
             "timings": {"step_ms": self._median("step_ms"), "look_ms": self._median("query_step_ms")},
         }
 
@@ -92,12 +98,15 @@ class Findings:
 def merged(towns: Sequence[Findings]) -> Findings:
     """The findings of several towns under the same conditions as one: sequences, queries and jumps of all, side by side."""
     first = towns[0]
+    in_all = set.intersection(*({(one.mode, one.name) for one in town.results} for town in towns))  # a method may fail in one
     results = [
-        ConditionResult(one.name, tuple(sequence for town in towns for sequence in town.results[i].sequences), one.mode)
-        for i, one in enumerate(first.results)
+        ConditionResult(one.name, tuple(part for town in towns for part in town.of(one).sequences), one.mode)
+        for one in first.results
+        if (one.mode, one.name) in in_all
     ]
+    failed = {f"{label}, town {number}": why for number, town in enumerate(towns, 1) for label, why in town.failed.items()}
     places = [side_by_side([town.places[i] for town in towns]) for i in range(len(first.places))]
     kidnapped = {name: tuple(jump for town in towns for jump in town.kidnapped[name]) for name in first.kidnapped}
     paper = tuple(sequence for town in towns for sequence in town.paper)
     map_bytes, views = sum(town.map_bytes for town in towns), sum(town.views for town in towns)
-    return Findings(results, places, kidnapped, paper, map_bytes, views)
+    return Findings(results, places, kidnapped, paper, map_bytes, views, failed)

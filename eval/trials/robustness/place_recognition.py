@@ -101,15 +101,13 @@ def recognise(cognitive_map: CognitiveMap, mapping: Recording, queries: Queries,
         queries: The query frames.
         config: Settings of the localizer whose recogniser is judged.
     """
-    vertex = places.first_vertex(cognitive_map.view_cell, len(cognitive_map.view_cells.templates))
-    steps = np.searchsorted(mapping.samples.t_s, cognitive_map.t_s[vertex] - 1e-6)
-    places_m = mapping.samples.poses_m[steps]
+    steps, places_m = places_of(cognitive_map, mapping)
     single = replace(config, sequence=SequenceConfig(memory=0.0))
     templates = [_template(mapping.frame(int(mapping.samples.frame[step]))) for step in steps]
     similarity = np.array([_similarity(np.array(templates), _template(frame)) for frame in queries.frames])
     cells = np.argmax(similarity, axis=1)
     best = similarity[np.arange(len(cells)), cells]
-    margins = np.array([_margin(row, places_m) for row in similarity])
+    margins = np.array([margin_of(row, places_m) for row in similarity])
     found = (
         *(tuple(zip(*_by_views(cognitive_map, queries, one), strict=True)) for one in (config, single)),
         (cells, best),
@@ -119,6 +117,13 @@ def recognise(cognitive_map: CognitiveMap, mapping: Recording, queries: Queries,
         judged(method, np.array(cell), np.array(score, dtype=np.float64), queries.poses_m, places_m)
         for method, (cell, score) in zip(METHODS, found, strict=True)
     )
+
+
+def places_of(cognitive_map: CognitiveMap, mapping: Recording) -> tuple[IntArray, FloatArray]:
+    """Steps (C,) of the mapping drive at which the map's distinct views were first seen, and where (C, 3) that truly was."""
+    vertex = places.first_vertex(cognitive_map.view_cell, len(cognitive_map.view_cells.templates))
+    steps = np.searchsorted(mapping.samples.t_s, cognitive_map.t_s[vertex] - 1e-6)
+    return steps.astype(np.int32), mapping.samples.poses_m[steps]
 
 
 def judged(method: str, cell: IntArray, score: FloatArray, poses_m: FloatArray, places_m: FloatArray) -> Answers:
@@ -168,7 +173,7 @@ def _similarity(templates: UInt8Array, query: UInt8Array) -> FloatArray:
     return likest
 
 
-def _margin(similarity: FloatArray, places_m: FloatArray) -> float:
+def margin_of(similarity: FloatArray, places_m: FloatArray) -> float:
     """How far the most similar place stands out from the best one elsewhere, in standard deviations of all similarities (C,)."""
     best = int(np.argmax(similarity))
     elsewhere = np.hypot(*(places_m[:, :2] - places_m[best, :2]).T) > places.SAME_PLACE_M

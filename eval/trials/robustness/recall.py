@@ -67,7 +67,8 @@ def recall_at(found: Curve, precision: float = PRECISION) -> float:
 
 def side_by_side(results: Sequence[PlaceResult]) -> PlaceResult:
     """One condition's answers in several towns as if all had been given in one, so that one threshold holds for all."""
-    by_method = zip(*(one.answers for one in results), strict=True)
+    in_all = set.intersection(*({one.method for one in result.answers} for result in results))  # a method may fail in one town
+    by_method = zip(*([one for one in result.answers if one.method in in_all] for result in results), strict=True)
     return PlaceResult(results[0].condition, tuple(map(_concatenated, by_method)))
 
 

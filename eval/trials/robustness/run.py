@@ -18,6 +18,7 @@ from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.refinement.refine import refine
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.contest.entry import Added, entries_of
 from hippodrome.eval.methods.materials import refine_config
 from hippodrome.eval.methods.stages import map_recording
 from hippodrome.eval.pool import Workers, worker_pool
@@ -26,6 +27,7 @@ from hippodrome.eval.trials.robustness.conditions import CONDITIONS, SAME, chose
 from hippodrome.eval.trials.robustness.findings import Findings
 from hippodrome.eval.trials.robustness.kidnapping import Kidnapping, kidnappings
 from hippodrome.eval.trials.robustness.localize import localized_sequence, sequence_steps
+from hippodrome.eval.trials.robustness.methods import FAR_M, MethodTask, describe_places, localizing, try_method
 from hippodrome.eval.trials.robustness.paper_lengths import PaperSequence, paper_sequences
 from hippodrome.eval.trials.robustness.place_recognition import half_known, queries_of, recognise
 from hippodrome.eval.trials.robustness.recall import PlaceResult
@@ -40,7 +42,6 @@ from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.survey import with_survey_error
 from hippodrome.sim.town import TownSpec
 
-FAR_M: Final = 1e6  # the truth of a drive in another town is moved by this: no declared pose may be right there
 ELSEWHERE_SEED: Final = 1_000  # added to the scenario's seed: another town of the same kind
 
 
@@ -55,6 +56,7 @@ class RobustnessRequest:
     modes: Sequence[Mode]
     workers: int
     out: Path
+    methods: Sequence[Added] = ()  # that take part beside those that the scenarios name
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +74,9 @@ class ConditionTask:
 
 def robustness(request: RobustnessRequest) -> None:
     """Write the robustness trial of each town and, if there are several, of all together. Raises HippodromeError on bad input."""
-    scenarios = load_scenarios(request.scenarios, None, None)
+    scenarios = load_scenarios(request.scenarios, None, None, request.methods)
+    for scenario in scenarios:
+        entries_of(scenario)  # what cannot be loaded is said before anything is simulated
     conditions = chosen(request.conditions)
     if request.only is not None and request.only > request.sequences:
         raise HippodromeError(f"--start {request.only}: there are {request.sequences} starts, see --sequences")
@@ -93,6 +97,13 @@ def _town(scenario: Scenario, conditions: Sequence[str], request: RobustnessRequ
     pool.run("map", _build_map, [(scenario, out)])
     by_mode = [replace(task, mode=mode) for mode in request.modes for task in tasks]
     results = pool.run("localize", _localize, [*by_mode, away])
+    drives = tuple((task.name, task.scenario) for task in [*tasks, away])
+    wanted_of = (drives, map_path(scenario, out), *wanted)
+    tried = pool.run("methods", try_method, [MethodTask(label, scenario, *wanted_of) for label in localizing(scenario)])
+    for one in tried:
+        results += one.results
+        if one.failure is not None:
+            print(f"{scenario.name}: {one.label}: {one.failure}", flush=True)
     if request.only is not None:
         print(conditions_markdown(scenario.name, results))
         return None
@@ -100,8 +111,9 @@ def _town(scenario: Scenario, conditions: Sequence[str], request: RobustnessRequ
     kidnapped = dict(zip(conditions, pool.run("kidnap", _kidnap, tasks), strict=True))
     paper = pool.run("lengths", _paper_lengths, tasks[:1])[0]
     path = map_path(scenario, out)
+    failed = {one.label: one.failure for one in tried if one.failure is not None}
     views = len(load_map(path)[0].view_cells.templates)
-    found = Findings(results, places, kidnapped, paper, path.stat().st_size, views)
+    found = Findings(results, places, kidnapped, paper, path.stat().st_size, views, failed)
     report_town(out / scenario.name, scenario.name, found)
     return found
 
@@ -158,7 +170,9 @@ def _recognise(task: ConditionTask) -> PlaceResult:
     drive = finish(RecordingPlan(task.scenario, "localization", task.out))
     mapping = finish(RecordingPlan(task.mapped, "mapping", task.out))
     cognitive_map, config = half_known(load_map(map_path(task.mapped, task.out))[0]), task.scenario.localizer
-    return PlaceResult(task.name, recognise(cognitive_map, mapping, queries_of(drive, config), config))
+    queries = queries_of(drive, config)
+    others = describe_places(task.mapped, cognitive_map, mapping, queries, task.out)
+    return PlaceResult(task.name, (*recognise(cognitive_map, mapping, queries, config), *others))
 
 
 def _kidnap(task: ConditionTask) -> tuple[Kidnapping, ...]:

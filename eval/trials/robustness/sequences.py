@@ -80,11 +80,11 @@ class SequenceResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConditionResult:
-    """All sequences under one condition, localized by one mode of the localizer."""
+    """All sequences under one condition, localized by one mode of our localizer, or by another method."""
 
     name: str
     sequences: tuple[SequenceResult, ...]
-    mode: Mode = MAIN_MODE
+    mode: str = MAIN_MODE  # of our localizer, or the label of another method
 
     @property
     def failures(self) -> list[SequenceResult]:

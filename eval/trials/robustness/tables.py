@@ -37,7 +37,8 @@ def conditions_markdown(name: str, results: Sequence[ConditionResult]) -> str:
 
 
 def yardsticks_markdown(results: Sequence[ConditionResult]) -> str:
-    """One row a mode of the localizer: all conditions of the mapped town pooled, and the error under the same condition."""
+    """One row a mode of the localizer, and one a method beside ours: all conditions of the mapped town pooled, and the error
+    under the same condition."""
     rows = []
     for mode in dict.fromkeys(result.mode for result in results):
         of_mode = [result for result in results if result.mode == mode and result.name != ELSEWHERE]
@@ -45,7 +46,7 @@ def yardsticks_markdown(results: Sequence[ConditionResult]) -> str:
         same = [_figures(result.summary(), "error_mean_m", "error_p95_m") for result in of_mode if result.name == SAME]
         rows.append([mode, *_cells(row), same[0] if same else NONE])
     head = ["mode", *FIGURES, "same: error mean / p95, m"]
-    return _part("## Yardsticks, given the same injections", table(head, rows, align="left"))
+    return _part("## Yardsticks, given the same injections, and other methods", table(head, rows, align="left"))
 
 
 def places_markdown(results: Sequence[PlaceResult]) -> str:

@@ -37,6 +37,11 @@ class StressCase:
     self_similar: bool = False  # whether the town is a grid of equal blocks, one a seed, whatever the scenario's town
     start_known: bool = False  # whether the first pose is given to the refinement
 
+    @property
+    def ours_alone(self) -> bool:
+        """Whether it changes our own map, which other methods are not given, and nothing else."""
+        return self.false_closures > 0.0 and self.name != "paper"
+
     def self_motion(self) -> SelfMotionNoise:
         """The errors that the self-motion is sensed with."""
         level = NOISE_LEVELS[self.noise]

@@ -28,4 +28,5 @@ class StressRow:
     failure: str | None = None
     far: int = 0  # vertices vouched for that are farther than FAR_M from the truth
     right_share: float | None = None  # share of the vertices on known roads that are vouched for and within FAR_M of the truth
+    method: str = ""  # label of a method beside ours; empty: our refinement
     rerun: str = ""  # the command that makes this row anew

@@ -14,6 +14,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from hippodrome._files import write_atomically
+from hippodrome.eval.contest.entry import Added, Entry, entries_of, with_methods
+from hippodrome.eval.contest.sources import methods_sha256
+from hippodrome.eval.contest.trials import added_methods
 from hippodrome.eval.figures.stress import draw_stress
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.pool import worker_pool
@@ -23,7 +26,7 @@ from hippodrome.eval.run import make_recordings
 from hippodrome.eval.trials.stress.cases import StressCase, chosen_cases, in_self_similar_grid
 from hippodrome.eval.trials.stress.rows import StressRow
 from hippodrome.eval.trials.stress.table import stress_markdown
-from hippodrome.eval.trials.stress.trial import StressedDrive, run_case
+from hippodrome.eval.trials.stress.trial import StressedDrive, run_case, run_method
 from hippodrome.sim.record import RecordingPlan, finish
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NoiseLevel
@@ -46,14 +49,22 @@ class StressTask:
         """The command that runs one case alone."""
         return f"hippodrome stress {self.path} --seeds {self.scenario.seed} --case '{case.name}'"
 
-    def row_file(self, case: StressCase) -> Path:
+    def row_file(self, case: StressCase, method: str = "") -> Path:
         """Where the case's row is kept: a name made of all that the row depends on."""
         code = figure_code_sha256("eval/trials/stress/*.py")
-        text = json.dumps([self.plan().folder().name, self.scenario.model_dump_json(exclude={"town"}), asdict(case), code])
+        whole = [self.plan().folder().name, self.scenario.model_dump_json(exclude={"town"}), asdict(case), code]
+        text = json.dumps([*whole, method, *methods_sha256(self.scenario)] if method else whole)
         return self.out / "rows" / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.json"
 
 
-def stress(paths: Sequence[Path], seeds: Sequence[int], names: Sequence[str], workers: int, out: Path) -> None:
+def stress(
+    paths: Sequence[Path],
+    seeds: Sequence[int],
+    names: Sequence[str],
+    workers: int,
+    out: Path,
+    methods: Sequence[Added] = (),
+) -> None:
     """Run cases over scenarios x seeds; write ``stress.json``, ``stress.md`` and ``stress.png``, and print the table.
 
     Args:
@@ -62,22 +73,26 @@ def stress(paths: Sequence[Path], seeds: Sequence[int], names: Sequence[str], wo
         names: Names of the cases to run; none: all of them.
         workers: How many processes to use.
         out: Folder for the results, the recordings and the rows kept for the next run.
+        methods: Methods that take part beside those that the scenarios name.
 
     Raises:
         HippodromeError: A scenario cannot be used, or there is no case of a name.
     """
     cases = chosen_cases(names)
-    tasks = [task for path in paths for seed in seeds for task in _tasks(path, seed, cases, out, path == paths[0])]
+    tasks = [task for path in paths for seed in seeds for task in _tasks(path, seed, cases, out, path == paths[0], methods)]
+    for scenario in {task.scenario.name: task.scenario for task in tasks}.values():
+        _say_left_out(scenario)
     with worker_pool(workers) as pool:
         make_recordings([task.plan() for task in tasks], pool)
         rows = [row for part in pool.run("refine", run_cases, tasks, weight=lambda task: len(task.cases)) for row in part]
-    rows.sort(key=lambda row: [case.name for case in cases].index(row.case))
+    rows.sort(key=lambda row: (row.method != "", row.method, [case.name for case in cases].index(row.case)))
     write_atomically(
         out / "stress.json", to_json({"cases": [asdict(case) for case in cases], "rows": [asdict(row) for row in rows]}).encode()
     )
     text = stress_markdown(rows)
     write_atomically(out / "stress.md", text.encode())
-    draw_stress(out / "stress.png", {case.name: [row.ape_mean_m for row in rows if row.case == case.name] for case in cases})
+    ours = [row for row in rows if not row.method]
+    draw_stress(out / "stress.png", {case.name: [row.ape_mean_m for row in ours if row.case == case.name] for case in cases})
     print(f"{text}\n{out / 'stress.json'}, {out / 'stress.md'}, {out / 'stress.png'}")
 
 
@@ -90,18 +105,50 @@ def run_cases(task: StressTask) -> list[StressRow]:
             row = run_case(case, drive, task.rerun(case))
             write_atomically(file, to_json(asdict(row)).encode())
         rows[case.name] = StressRow(**json.loads(file.read_text()))
-    return list(rows.values())
+    return [*rows.values(), *_rows_of_methods(task, drive)]
+
+
+def _rows_of_methods(task: StressTask, drive: StressedDrive) -> list[StressRow]:
+    """Every case that applies to methods beside ours, of each that maps and answers in the network's frame."""
+    rows = []
+    for entry in applicable(task.scenario):
+        label = entry.method.label
+        for case in (one for one in task.cases if not one.ours_alone):
+            file = task.row_file(case, label)
+            if not file.exists():
+                row = run_method(case, drive, entry, task.rerun(case))
+                write_atomically(file, to_json(asdict(row)).encode())
+            rows.append(StressRow(**json.loads(file.read_text())))
+    return rows
+
+
+def applicable(scenario: Scenario) -> list[Entry]:
+    """The methods beside ours that errors in self-motion and roads are put to: those that answer in the network's frame."""
+    return [entry for entry in added_methods(scenario, "map") if entry.method.frame == "network"]
+
+
+def _say_left_out(scenario: Scenario) -> None:
+    """Name the methods that no case is put to, and why."""
+    taken = [entry.method.key for entry in applicable(scenario)]
+    for entry in entries_of(scenario):
+        if entry.source != "hippodrome" and entry.method.key not in taken:
+            why = (
+                "it makes no map" if "map" not in entry.does else f"it answers in frame '{entry.method.frame}', not the network's"
+            )
+            print(f"{scenario.name}: {entry.method.label}: left out: {why}", flush=True)
 
 
 def _drive(task: StressTask) -> StressedDrive:
     return StressedDrive(task.scenario, finish(task.plan()), task.plan().town(), task.out / "towns")
 
 
-def _tasks(path: Path, seed: int, cases: Sequence[StressCase], out: Path, with_grid: bool) -> list[StressTask]:
+def _tasks(
+    path: Path, seed: int, cases: Sequence[StressCase], out: Path, with_grid: bool, methods: Sequence[Added] = ()
+) -> list[StressTask]:
     """Cases grouped by the drive that they need: the lateral wander of a noise level makes another one, and so does the
     self-similar grid, which is run with the first scenario only (``with_grid``).
     """
-    scenario = read_scenario(path, seed=seed)
+    scenario = with_methods(read_scenario(path, seed=seed), methods)
     groups: dict[tuple[NoiseLevel, bool], list[StressCase]] = {}
     for case in cases:
         if with_grid or not case.self_similar:

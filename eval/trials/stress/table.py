@@ -27,10 +27,15 @@ NOTES: Final = (
 
 def stress_markdown(rows: Sequence[StressRow]) -> str:
     """A line per case, over all its runs; below the table, every run that failed."""
-    cases = dict.fromkeys(row.case for row in rows)
-    lines = table(HEAD, [_cells(case, [row for row in rows if row.case == case]) for case in cases])
-    refused = [f"- {row.case}, {row.scenario}, seed {row.seed}: {row.failure}. `{row.rerun}`" for row in rows if row.failure]
+    cases = dict.fromkeys(_name(row) for row in rows)
+    lines = table(HEAD, [_cells(case, [row for row in rows if _name(row) == case]) for case in cases])
+    refused = [f"- {_name(row)}, {row.scenario}, seed {row.seed}: {row.failure}. `{row.rerun}`" for row in rows if row.failure]
     return "\n".join(["# Stress of the refinement, from rendered frames", "", *lines, "", *NOTES, "", *refused, ""])
+
+
+def _name(row: StressRow) -> str:
+    """The case, and whose it is if it is not our refinement's."""
+    return f"{row.method}: {row.case}" if row.method else row.case
 
 
 def _cells(case: str, rows: Sequence[StressRow]) -> list[str]:
@@ -39,6 +44,7 @@ def _cells(case: str, rows: Sequence[StressRow]) -> list[str]:
     counts = [case, str(len(rows)), str(len(rows) - len(good))]
     if not good:
         return [*counts, *["-"] * (len(HEAD) - len(counts))]
+    method = rows[0].method
     apes_m = np.array([row.ape_mean_m for row in good], dtype=float)
     worst = max(good, key=lambda row: row.ape_mean_m or 0.0)
     return [
@@ -48,9 +54,14 @@ def _cells(case: str, rows: Sequence[StressRow]) -> list[str]:
         f"{max(row.ape_max_m or 0.0 for row in good):.1f}",
         f"{np.mean([row.rpe_20m_mean_m for row in good]):.2f}",
         f"{100 * np.mean([row.matched_share for row in rows]):.1f}",
-        f"{100 * np.mean([row.right_share for row in good if row.right_share is not None] or [0.0]):.1f}",
+        _mean([row.right_share for row in good if row.right_share is not None] or ([] if method else [0.0]), 100.0, 1),
         f"{100 * sum(row.far for row in rows) / max(sum(row.matched_share * row.vertices for row in rows), 1.0):.2f}",
         str(sum(row.wrong for row in rows)),
-        f"{np.mean([row.nees for row in good if row.nees is not None]):.2f}",
+        _mean([row.nees for row in good if row.nees is not None], 1.0, 2),
         f"{np.median([row.cpu_s for row in rows]):.1f}",
     ]
+
+
+def _mean(values: Sequence[float], factor: float, digits: int) -> str:
+    """The mean in the table's unit, or a dash if there is no value."""
+    return f"{factor * np.mean(values):.{digits}f}" if values else "-"

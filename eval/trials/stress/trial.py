@@ -13,7 +13,9 @@ from hippodrome.core.refinement.refine import refine
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, MatchStatus, StartPose, Trajectory
-from hippodrome.eval.methods.materials import RPE_DELTA_M, refine_config
+from hippodrome.eval.contest.entry import Entry
+from hippodrome.eval.contest.trials import map_alone
+from hippodrome.eval.methods.materials import RPE_DELTA_M, Materials, refine_config
 from hippodrome.eval.methods.stages import map_recording
 from hippodrome.eval.methods.warm_up import warm_up
 from hippodrome.eval.metrics.calibration import nees, pose_errors
@@ -75,6 +77,46 @@ def run_case(case: StressCase, drive: StressedDrive, rerun: str) -> StressRow:
     if case.foreign:  # no vertex is on a road of that network
         return row
     return replace(row, right_share=_right_share(refined, drive.recording, drive.town.network, roads))
+
+
+def run_method(case: StressCase, drive: StressedDrive, entry: Entry, rerun: str) -> StressRow:
+    """Give a method beside ours the case's self-motion and roads, and score its trajectory as it lies.
+
+    False loop closures are errors of our own map; it has none of them. It vouches for all of its poses.
+
+    Args:
+        case: What goes wrong.
+        drive: The recorded drive.
+        entry: A method that maps, and answers in the network's frame.
+        rerun: The command that runs this case alone, kept in the row.
+    """
+    warm_up()
+    scenario, recording = drive.scenario, drive.recording
+    sensed = sensed_anew(recording, case.self_motion(), np.random.default_rng([scenario.seed, 3]))
+    survey_error_m = max(case.survey_error_m, NOISE_LEVELS[case.noise].survey_error_m)
+    roads = _roads_under(case, drive, survey_error_m, np.random.default_rng([scenario.seed, 4]))
+    materials = Materials(scenario, drive.towns_folder.parent / scenario.name, drive.town, roads, sensed, sensed)
+    materials.folder.mkdir(parents=True, exist_ok=True)
+    row = StressRow(scenario.name, scenario.seed, case.name, 0, method=entry.method.label, rerun=rerun)
+    try:
+        trajectory, cpu_s = map_alone(entry, materials)
+        truth = recording.ground_truth()
+        absolute, relative = ape(trajectory, truth), rpe(trajectory, truth, RPE_DELTA_M)
+    except HippodromeError as error:
+        return replace(row, failure=str(error))
+    errors_m = absolute.errors_m
+    return replace(
+        row,
+        vertices=len(errors_m),
+        matched_share=1.0,
+        wrong=int(np.count_nonzero(errors_m > WRONG_M)),
+        far=int(np.count_nonzero(errors_m > FAR_M)),
+        ape_mean_m=absolute.mean_m,
+        ape_max_m=float(errors_m.max()),
+        ape_all_mean_m=absolute.mean_m,
+        rpe_20m_mean_m=relative.mean_m,
+        cpu_s=cpu_s,
+    )
 
 
 def _roads_under(case: StressCase, drive: StressedDrive, survey_error_m: float, rng: np.random.Generator) -> RoadNetwork:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.contest.entry import BUILT_IN, entries_of, load_class, parse_method, with_methods
+from hippodrome.eval.contest.entry import BUILT_IN, entries_of, parse_method, with_methods
+from hippodrome.eval.contest.loading import load_class, made_of
 from hippodrome.eval.contest.perform import perform
 from hippodrome.sim.scenario import Scenario
 
@@ -88,6 +89,37 @@ class Little(Mapper):
         return list(super().map(observations, given))[:50]
 
 class Empty: ...
+
+class Endless:
+    def map(self, observations, given):
+        while True:
+            pass
+
+class Sleeps:
+    needs = Needs(camera=False)
+    def describe(self, frame):
+        import time
+        time.sleep(1000.0)
+
+class Hungry:
+    def map(self, observations, given):
+        return [np.ones(100_000_000) for _ in range(300)]
+
+class Aborts:
+    def map(self, observations, given):
+        import os
+        os.abort()
+
+class Prints(Mapper):
+    def __init__(self):
+        self.lock = __import__("threading").Lock()  # cannot be pickled
+    def map(self, observations, given):
+        print("a line on standard output")
+        return super().map(observations, given)
+    def localize(self, observations, given):
+        with self.lock:
+            for one in observations:
+                yield Answer(one.t_s, 0.0, 0.0, 0.0)
 """
 
 
@@ -156,7 +188,7 @@ def test_a_configuration_is_checked_by_the_method_s_own_model(materials):
     def scenario(**config):
         return Scenario(name="circle", methods={"set": {"class": "entrants:Configured", "config": config}})
 
-    assert entries_of(scenario(factor=2.0))[-1].runner.factor == 2.0
+    assert made_of(load_class("entrants:Configured"), {"factor": 2.0}, None, "set").factor == 2.0
     with pytest.raises(HippodromeError, match=r"method set: config\.factor: "):
         entries_of(scenario(factor="many"))
 
@@ -199,3 +231,24 @@ def test_ours_are_methods_like_everybody_s():
     assert all("map" in entry.does for entry in entries)
     assert [entry.method.label for entry in entries if "localize" in entry.does] == ["topometric (paper)", "topometric"]
     assert np.unique([entry.method.stem for entry in entries]).size == len(entries)
+
+
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("Endless", "hung: no end after 3 s, its limit"),
+        ("Hungry", "MemoryError"),
+        ("Aborts", "crashed: signal 6 (SIGABRT)"),
+    ],
+)
+def test_a_class_that_never_ends_or_takes_too_much_is_contained(materials, name, cause):
+    spec = {"class": f"entrants:{name}", "time_limit_s": 3.0 if name == "Endless" else 100.0, "memory_limit_mb": 3000}
+    entry = entries_of(Scenario(name="circle", methods={"mine": spec}))[-1]
+    assert cause in perform(materials, [entry]).rows[0].failure
+
+
+def test_a_class_may_print_and_keep_what_cannot_be_pickled_and_its_memory_is_measured(materials):
+    row = row_of(materials, "Prints")
+    assert row.failure is None
+    assert row.localization is not None
+    assert row.peak_rss_bytes > 20e6

@@ -1,6 +1,7 @@
 """A program that reads files: what it is given, what it may take, and a row with the cause for whatever it does."""
 
 import stat
+import sys
 
 import pytest
 
@@ -43,7 +44,7 @@ def python(text):
     return f"#!/usr/bin/env python3\n{text}"
 
 
-@pytest.mark.parametrize("layout", ["tum", "euroc", "kitti"])
+@pytest.mark.parametrize("layout", ["tum", "euroc", "kitti", "rosbag2", "mcap"])
 def test_a_program_has_a_row_with_errors_and_costs(row, layout):
     found = row(python(INTEGRATE), input=layout)
     assert found.failure is None
@@ -52,6 +53,44 @@ def test_a_program_has_a_row_with_errors_and_costs(row, layout):
     assert found.peak_rss_bytes > 1_000_000
     assert found.latency_ms is None
     assert found.covered == 1.0
+
+
+ODOMETRY_OF_A_BAG = """\
+import math, sys
+from pathlib import Path
+sequence, out = map(Path, sys.argv[1:])
+rows = []
+if (sequence / "drive.mcap").exists():
+    from mcap_protobuf.reader import read_protobuf_messages
+    kept = [m for m in read_protobuf_messages(str(sequence / "drive.mcap"), log_time_order=True)]
+    assert {m.topic for m in kept} == {"/camera", "/self_motion"}, {m.topic for m in kept}
+    rows = [(m.log_time_ns / 1e9, m.proto_msg.linear_velocity.x, m.proto_msg.angular_velocity.z)
+            for m in kept if m.topic == "/self_motion"]
+else:
+    from rosbags.rosbag2 import Reader
+    from rosbags.typesys import Stores, get_typestore
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    with Reader(sequence / "drive") as bag:
+        assert {one.topic for one in bag.connections} == {"/camera/image/compressed", "/odometry"}
+        for connection, stamp, raw in bag.messages():
+            if connection.topic == "/odometry":
+                twist = types.deserialize_cdr(raw, connection.msgtype).twist.twist
+                rows.append((stamp / 1e9, twist.linear.x, twist.angular.z))
+x = y = heading = before = 0.0
+with (out / "trajectory.tum").open("w") as stream:
+    for t_s, speed, yaw_rate in rows:
+        heading += yaw_rate * (t_s - before)
+        x, y = x + speed * (t_s - before) * math.cos(heading), y + speed * (t_s - before) * math.sin(heading)
+        before = t_s
+        stream.write(f"{t_s} {x} {y} 0 0 0 {math.sin(heading / 2)} {math.cos(heading / 2)}\\n")
+"""
+
+
+@pytest.mark.parametrize("layout", ["rosbag2", "mcap"])
+def test_a_bag_holds_the_frames_and_the_self_motion_and_no_truth(row, layout):
+    found = row(f"#!{sys.executable}\n{ODOMETRY_OF_A_BAG}", input=layout)
+    assert found.failure is None
+    assert found.ape.mean_m < 1.0
 
 
 def test_frames_lie_where_each_layout_has_them(row):

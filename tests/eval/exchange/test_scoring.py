@@ -181,3 +181,42 @@ def test_the_truth_of_an_import_is_kept_as_it_came(run, exported, tmp_path):
     foreign(run, exported, tmp_path / "seq", 7.0)
     imported(tmp_path / "seq", tmp_path / "in")
     assert "truth.npz" in open_recording(tmp_path / "in").manifest["sha256"]
+
+
+def test_a_localizer_s_poses_are_scored_in_full_with_a_column_that_says_which_it_stands_by(run, tmp_path, capsys):
+    drive = run.mapping
+    truth = drive.ground_truth()
+    table = rows(truth)
+    table[50:60, 1] += 50.0  # a false fix
+    stands = (np.arange(len(table)) >= 20).astype(int)
+    file, out = tmp_path / "localized.tum", tmp_path / "score.json"
+    np.savetxt(file, np.column_stack([table, stands]), fmt=["%.9f"] * 8 + ["%d"])
+    status, said = scored(capsys, file, drive.folder, "--localization", "--json", out, "--max-ape", 100)
+    assert status == DONE
+    found = json.loads(out.read_text())
+    assert found["localized_column"]
+    figures = found["localization"]
+    assert figures["success"]
+    assert figures["false_fixes"] == 1
+    assert figures["initial_drive_s"] == pytest.approx(truth.t_s[20] - truth.t_s[0])
+    assert figures["localized_share"] == pytest.approx(1.0 - 20 / len(table))
+    assert figures["initial_time_ms"] is None
+    assert "false fixes: 1" in said.out
+    assert scored(capsys, file, drive.folder, "--localization", "--max-ape", 0.001)[0] == THRESHOLD_FAILED
+
+
+def test_without_the_column_a_localizer_stands_by_all_poses_and_did_not_know_where_it_has_none(run, tmp_path, capsys):
+    drive = run.mapping
+    table = rows(drive.ground_truth())
+    file, out = tmp_path / "localized.tum", tmp_path / "score.json"
+    np.savetxt(file, table[len(table) // 2 :], fmt="%.9f")
+    status, said = scored(capsys, file, drive.folder, "--localization", "--json", out)
+    assert status == DONE
+    assert "no column 'localized'" in said.out
+    figures = json.loads(out.read_text())["localization"]
+    assert figures["error_mean_m"] < 0.001
+    assert figures["localized_share"] == pytest.approx(0.5, abs=0.02)
+    file.write_text(file.read_text().replace("\n", " 2\n"))
+    status, said = scored(capsys, file, drive.folder, "--localization")
+    assert status == BAD_INPUT
+    assert "line 1: '2' in the column 'localized'" in said.err

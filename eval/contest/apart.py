@@ -1,0 +1,176 @@
+"""A Python class in a process of its own: handed its observations one by one, held to limits of time and memory, and measured.
+
+The class runs in ``child.py``; what it returns comes back pickled, its state stays where it is. It is not kept from anything that
+the user may read: it is trusted not to look for the truth.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import select
+import struct
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from hippodrome.core.types import FloatArray, Frame, Observation
+from hippodrome.eval.contest.guard import Crashed
+from hippodrome.eval.contest.process import POLL_S, Limits, Process, started
+from hippodrome.eval.methods.protocol import Given, Localized, Mapped, MethodError
+from hippodrome.sim.method_spec import MethodSpec
+
+CHILD: Final = "hippodrome.eval.contest.child"
+LENGTH: Final = struct.Struct("<Q")  # before each message: its length in bytes
+LOOK_S: Final = 1.0  # between two looks at what memory it holds
+CHUNK_BYTES: Final = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """What the process makes its object of."""
+
+    label: str
+    spec: MethodSpec
+    path: tuple[str, ...]  # where modules are looked for
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """Stands for the state of a map that stays in the method's own process."""
+
+
+class Apart:
+    """The functions of a class, carried out in one process, which begins with the first call and ends with ``close``."""
+
+    def __init__(self, label: str, spec: MethodSpec) -> None:
+        self._made = Made(label, spec, tuple(sys.path))
+        self._limits = Limits.of(spec)
+        self._stack = ExitStack()
+        self._process: Process | None = None
+
+    def close(self) -> None:
+        """End the process; a later call begins another."""
+        self._process = None
+        self._stack.close()
+
+    def _map(self, observations: Iterator[Observation], given: Given) -> Mapped:
+        mapped: Mapped = self._call("map", _sendable(given), observations)
+        return replace(mapped, save=self._save) if mapped.save is not None else mapped
+
+    def _localize(self, observations: Iterator[Observation], given: Given) -> Localized:
+        localized: Localized = self._call("localize", _sendable(given), observations)
+        return localized
+
+    def _describe(self, frame: Frame) -> FloatArray:
+        vector: FloatArray = self._call("describe", frame)
+        return vector
+
+    def _warm_up(self) -> None:
+        self._call("warm_up", None)
+
+    def _save(self, path: Path) -> int:
+        size: int = self._call("save", path)
+        return size
+
+    def _call(self, name: str, argument: Any, observations: Iterator[Observation] | None = None) -> Any:
+        """What the class's function returns; each call has the whole limit of time. Raises MethodError, Crashed."""
+        try:
+            message = pickle.dumps((name, argument), pickle.HIGHEST_PROTOCOL)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise MethodError(f"what it builds on cannot be handed to another process: {error}") from None
+        process = self._process or self._begin()
+        process.began_s = time.monotonic()
+        self._send(process, message)
+        while True:
+            kind, value = pickle.loads(self._received(process))
+            if kind == "next":
+                assert observations is not None
+                self._send(process, pickle.dumps(next(observations, None), pickle.HIGHEST_PROTOCOL))
+            elif kind == "done":
+                process.look()
+                if isinstance(value, Mapped | Localized) and value.cost is not None:
+                    return replace(value, cost=replace(value.cost, peak_rss_bytes=process.peak_rss_bytes))
+                return value
+            elif kind == "crashed":
+                raise Crashed(*value)
+            else:
+                raise MethodError(value)
+
+    def _begin(self) -> Process:
+        self._stack = ExitStack()
+        folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
+        command = [sys.executable, "-m", CHILD]
+        self._process = self._stack.enter_context(started(command, folder, self._limits, fed=True))
+        self._send(self._process, pickle.dumps(self._made, pickle.HIGHEST_PROTOCOL))
+        return self._process
+
+    def _send(self, process: Process, body: bytes) -> None:
+        assert process.popen.stdin is not None
+        try:
+            process.popen.stdin.write(LENGTH.pack(len(body)) + body)
+            process.popen.stdin.flush()
+        except BrokenPipeError:
+            raise self._ended(process) from None
+
+    def _received(self, process: Process) -> bytes:
+        """The next message. Raises MethodError if the process ends instead, or is past a limit."""
+        assert process.popen.stdout is not None
+        source, held, wanted = process.popen.stdout.fileno(), bytearray(), LENGTH.size
+        looked_s, head = time.monotonic(), True
+        while len(held) < wanted:
+            if select.select([source], [], [], POLL_S)[0]:
+                data = os.read(source, min(wanted - len(held), CHUNK_BYTES))
+                if not data:
+                    raise self._ended(process)
+                held += data
+                if head and len(held) == wanted:
+                    wanted, head = LENGTH.unpack(held)[0], False
+                    held.clear()
+                continue
+            now_s = time.monotonic()
+            if now_s - looked_s > LOOK_S or process.left_s <= 0.0:
+                looked_s = now_s
+                if process.poll():
+                    raise self._ended(process)
+        return bytes(held)
+
+    def _ended(self, process: Process) -> MethodError:
+        """Why there is no answer; the process is over."""
+        end_s = time.monotonic() + 2.0
+        while not process.poll() and time.monotonic() < end_s:
+            time.sleep(POLL_S / 10.0)
+        cause = process.failure() or "it ended its process with status 0 before it answered"
+        self.close()
+        return MethodError(cause)
+
+
+# By the names that the protocol has them under: a class that lacks a function has a stand-in that lacks it, too.
+FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
+    "map": Apart._map,
+    "localize": Apart._localize,
+    "describe": Apart._describe,
+    "warm_up": Apart._warm_up,
+}
+
+
+def apart(cls: type[Any], label: str, spec: MethodSpec) -> Apart:
+    """A stand-in for an object of a class, with those of the protocol's functions that the class has."""
+    functions = {name: function for name, function in FUNCTIONS.items() if hasattr(cls, name)}
+    stand_in: Apart = type("Apart", (Apart,), functions)(label, spec)
+    return stand_in
+
+
+def _sendable(given: Given) -> Given:
+    """What it is given, without functions, which stay here."""
+    base, mapped = given.base, given.mapped
+    return replace(
+        given,
+        base=None if base is None else replace(base, save=None),
+        mapped=None if mapped is None else replace(mapped, save=None),
+    )

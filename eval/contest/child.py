@@ -1,0 +1,137 @@
+"""The process in which a class of ``apart.py`` runs: requests on standard input, answers on what was standard output.
+
+What the class prints goes to standard error, which the harness keeps in a file.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from time import process_time
+from typing import IO, Any
+
+import numpy as np
+
+from hippodrome.core.types import FloatArray, Frame, HippodromeError, Observation
+from hippodrome.eval.contest.apart import LENGTH, Kept, Made
+from hippodrome.eval.contest.guard import crash_of
+from hippodrome.eval.contest.loading import load_class, made_of
+from hippodrome.eval.methods.feed import Feed
+from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, as_estimate, as_mapped
+
+
+class Served:
+    """One object of a class, and the map that it made."""
+
+    def __init__(self, made: Made, source: IO[bytes], sink: IO[bytes]) -> None:
+        assert made.spec.class_ is not None
+        self._label, self._source, self._sink = made.label, source, sink
+        self._runner = made_of(load_class(made.spec.class_), made.spec.config, None, made.label)
+        self._mapped: Mapped | None = None
+
+    def map(self, given: Given) -> Mapped:
+        """Its map of the observations that it is handed, without what can only live here."""
+        feed, began = Feed(self._observations()), process_time()
+        self._mapped = as_mapped(self._runner.map(iter(feed), given), self._label)
+        feed.settle()
+        cost = self._mapped.cost or Cost(process_time() - began - feed.decoding_s, None, feed.step_s)
+        save = _can_be_saved if self._mapped.save is not None else None
+        state = self._mapped.state
+        return replace(self._mapped, state=state if _can_be_pickled(state) else Kept(), save=save, cost=cost)
+
+    def localize(self, given: Given) -> Localized:
+        """Its answers to the observations that it is handed."""
+        feed, began = Feed(self._observations()), process_time()
+        mapped = self._mapped if self._mapped is not None else given.mapped
+        found = self._runner.localize(iter(feed), replace(given, mapped=mapped))
+        if isinstance(found, Localized):
+            return replace(found, answers=[as_estimate(one, self._label) for one in found.answers])
+        answers = [as_estimate(one, self._label) for one in found]
+        feed.settle()
+        return Localized(answers, Cost(process_time() - began - feed.decoding_s, None, feed.step_cpu_s))
+
+    def describe(self, frame: Frame) -> FloatArray:
+        """Its vector of a frame."""
+        vector: FloatArray = np.asarray(self._runner.describe(frame))
+        return vector
+
+    def warm_up(self, _: None) -> None:
+        """Whatever it does before it is timed."""
+        self._runner.warm_up()
+
+    def save(self, path: Path) -> int:
+        """Its map in a file; the size in bytes."""
+        assert self._mapped is not None
+        assert self._mapped.save is not None
+        return self._mapped.save(path)
+
+    def _observations(self) -> Iterator[Observation]:
+        while True:
+            answer(self._sink, "next", None)
+            observation = request(self._source)
+            if observation is None:
+                return
+            yield observation
+
+
+def request(source: IO[bytes]) -> Any:
+    """The next message of the harness. Raises EOFError when there is none any more."""
+    head = source.read(LENGTH.size)
+    if len(head) < LENGTH.size:
+        raise EOFError
+    return pickle.loads(source.read(LENGTH.unpack(head)[0]))
+
+
+def answer(sink: IO[bytes], kind: str, value: Any) -> None:
+    """Send one message to the harness."""
+    body = pickle.dumps((kind, value), pickle.HIGHEST_PROTOCOL)
+    sink.write(LENGTH.pack(len(body)) + body)
+    sink.flush()
+
+
+def main() -> None:
+    """Serve requests until the harness closes the pipe."""
+    source, sink = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # a method that prints does not break the messages
+    served: Served | None = None
+    try:
+        made: Made = request(source)
+        sys.path[:] = made.path
+        while True:
+            name, argument = request(source)
+            try:
+                served = served or Served(made, source, sink)
+                value = getattr(served, name)(argument)
+            except EOFError:
+                raise
+            except HippodromeError as error:
+                answer(sink, "refused", str(error))
+            except SystemExit as error:
+                answer(sink, "refused", f"it left the process with status {error.code}")
+            except Exception as error:
+                answer(sink, "crashed", crash_of(error))
+            else:
+                answer(sink, "done", value)
+    except EOFError:
+        return
+
+
+def _can_be_pickled(state: Any) -> bool:
+    try:
+        pickle.dumps(state, pickle.HIGHEST_PROTOCOL)
+    except Exception:
+        return False
+    return True
+
+
+def _can_be_saved(_: Path) -> int:
+    """Stands for a function that stays here; ``apart.py`` asks for it."""
+    raise NotImplementedError
+
+
+if __name__ == "__main__":
+    main()

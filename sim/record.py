@@ -151,7 +151,8 @@ def _renderer(plan: RecordingPlan) -> FrameRenderer:
     key = (plan.scenario, plan.role)
     if not _live or _live[0][0] != key:
         close_renderer()
-        scene = build_scene(plan.town(), plan.scenario.seed, plan.drive_spec.conditions)
+        poses_m = _episode_of(plan.folder())[0].poses_m
+        scene = build_scene(plan.town(), plan.scenario.seed, plan.drive_spec.conditions, poses_m)
         _live.append((key, FrameRenderer(scene, plan.scenario.camera)))
     return _live[0][1]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import math
 import re
@@ -30,6 +31,7 @@ from hippodrome.sim.types import Town
 
 LANE_WIDTH_M: Final = 3.2  # SUMO's default
 POLE_SETBACK_M: Final = 0.8  # signal poles stand this far outside the carriageway
+MANY_LANES: Final = 5_000  # sumolib takes some 5 kB for each
 MIN_RING_M: Final = 40.0  # a narrower ring leaves no room for houses between the streets
 
 CROSSING_RADIUS_M: Final = 6.0  # kerb radius, so that a right turn follows 7.6 m rather than SUMO's 5.6 m
@@ -89,7 +91,7 @@ def read_town(net_file: Path, name: str | None = None) -> Town:
     check_places_to_wait(net, net_file)
     network = road_network(net, net_file)
     left_hand = is_left_hand(net_file)
-    return Town(
+    town = Town(
         name=name or net_file.name.split(".")[0],
         net_file=net_file,
         network=network,
@@ -98,6 +100,11 @@ def read_town(net_file: Path, name: str | None = None) -> Town:
         left_hand=left_hand,
         notes=check_network(net, network, net_file),
     )
+    large = network.lane_count > MANY_LANES
+    del net
+    if large:
+        gc.collect()  # sumolib's objects hold one another: hundreds of megabytes would wait for the next collection
+    return town
 
 
 def _plan(spec: TownSpec, rng_seed: int) -> Plan:

@@ -42,7 +42,7 @@ class DriveLog:
     speed_mps: list[float] = field(default_factory=list)
     start: list[int] = field(default_factory=lambda: [0])
     vehicle: list[int] = field(default_factory=list)
-    poses_m: list[tuple[float, float, float]] = field(default_factory=list)
+    poses_m: list[tuple[float, ...]] = field(default_factory=list)
     kind: list[int] = field(default_factory=list)
 
     def lanes(self, last: int = 0) -> LaneLog:
@@ -54,7 +54,7 @@ class DriveLog:
             t_s=np.arange(len(self.lane), dtype=np.float64) * SUMO_STEP_S,
             start=np.array(self.start, dtype=np.int32),
             vehicle=np.array(self.vehicle, dtype=np.int32),
-            poses_m=np.array(self.poses_m, dtype=np.float64).reshape(-1, 3),
+            poses_m=np.array(self.poses_m, dtype=np.float64).reshape(-1, len(self.poses_m[0]) if self.poses_m else 3),
             kind=np.array(self.kind, dtype=np.uint8),
         )
 

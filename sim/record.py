@@ -190,13 +190,14 @@ def record(plan: RecordingPlan) -> Recording:
 
 def _write_drive(path: Path, drive: Drive) -> None:
     log = {f"traffic_{field.name}": getattr(drive.traffic, field.name) for field in fields(TrafficLog)}
-    write_arrays(path, {**{field.name: getattr(drive, field.name) for field in fields(Drive) if field.name != "traffic"}, **log})
+    own = {field.name: getattr(drive, field.name) for field in fields(Drive) if field.name != "traffic"}
+    write_arrays(path, {**{name: value for name, value in own.items() if value is not None}, **log})
 
 
 def _read_drive(path: Path) -> Drive:
     log_names = [field.name for field in fields(TrafficLog)]
-    names = [field.name for field in fields(Drive) if field.name != "traffic"]
-    arrays = read_arrays(path, [*names, *(f"traffic_{name}" for name in log_names)])
+    names = [field.name for field in fields(Drive) if field.name not in ("traffic", "heights_m")]
+    arrays = read_arrays(path, [*names, *(f"traffic_{name}" for name in log_names)], optional=["heights_m"])
     log = TrafficLog(**{name: arrays.pop(f"traffic_{name}") for name in log_names})
     coverage, revisit_share = float(arrays.pop("coverage")), float(arrays.pop("revisit_share"))
     return Drive(**arrays, traffic=log, coverage=coverage, revisit_share=revisit_share)

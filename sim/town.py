@@ -22,6 +22,7 @@ from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
 from hippodrome.sim.map_import import LEFT_HAND, sumo_network
 from hippodrome.sim.net_file import SumoNet, check_places_to_wait, is_left_hand, load_net
+from hippodrome.sim.net_heights import crossings_without_height, lane_heights_m
 from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
@@ -100,6 +101,12 @@ def read_town(net_file: Path, name: str | None = None) -> Town:
         left_hand=left_hand,
         notes=check_network(net, network, net_file),
     )
+    heights_m = lane_heights_m(net, network)
+    notes = (*town.notes, *crossings_without_height(net, network, heights_m))
+    if heights_m is not None:
+        outlines = (np.array(node.getShape3D(), dtype=np.float64) for node in _paved_nodes(net))
+        town = replace(town, heights_m=heights_m, junction_heights_m=tuple(outline[:, 2] for outline in outlines))
+    town = replace(town, notes=notes)
     large = network.lane_count > MANY_LANES
     del net
     if large:
@@ -200,8 +207,12 @@ def _strip_comments(file: Path) -> None:
 
 def _junction_polygons(net: SumoNet) -> tuple[FloatArray, ...]:
     """Paved outlines of the junctions that cars pass."""
-    shapes = [node.getShape() for node in net.getNodes() if any(edge.allows("passenger") for edge in node.getIncoming())]
-    return tuple(np.array(shape, dtype=np.float64)[:, :2] for shape in shapes if len(shape) >= 3)
+    return tuple(np.array(node.getShape(), dtype=np.float64)[:, :2] for node in _paved_nodes(net))
+
+
+def _paved_nodes(net: SumoNet) -> list[SumoNet]:
+    passed = (node for node in net.getNodes() if any(edge.allows("passenger") for edge in node.getIncoming()))
+    return [node for node in passed if len(node.getShape()) >= 3]
 
 
 def _signals(net: SumoNet, left_hand: bool) -> FloatArray:

@@ -102,10 +102,26 @@ def town_near(town: Town, origin_m: FloatArray, blocks: list[Block], beyond_m: f
     corners = np.array([block.low_m() for block in blocks]) + origin_m
     low, high = corners.min(axis=0) - beyond_m, corners.max(axis=0) + BLOCK_M + beyond_m
     network, outlines = town.network, town.junction_polygons_m
+    heights, levels = town.heights_m, town.junction_heights_m
     lanes = np.flatnonzero(_touch(*_bounds(network.points_m, network.point_start[:-1]), low, high))
-    near = [outline for outline in outlines if np.all(outline.max(axis=0) >= low) and np.all(outline.min(axis=0) <= high)]
+    near = [i for i, line in enumerate(outlines) if np.all(line.max(axis=0) >= low) and np.all(line.min(axis=0) <= high)]
     signals = town.signals_m[_touch(town.signals_m[:, :2], town.signals_m[:, :2], low, high)]
-    return replace(town, network=_lanes_only(network, lanes), junction_polygons_m=tuple(near), signals_m=signals)
+    return replace(
+        town,
+        network=_lanes_only(network, lanes),
+        junction_polygons_m=tuple(outlines[i] for i in near),
+        signals_m=signals,
+        heights_m=None if heights is None else heights[_point_rows(network, lanes)],
+        junction_heights_m=None if levels is None else tuple(levels[i] for i in near),
+    )
+
+
+def _point_rows(network: RoadNetwork, lanes: np.ndarray) -> np.ndarray:
+    """Rows of ``points_m`` that belong to the lanes, in their order."""
+    counts = np.diff(network.point_start)[lanes]
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    rows: np.ndarray = np.repeat(network.point_start[lanes] - starts[:-1], counts) + np.arange(starts[-1])
+    return rows
 
 
 def _bounds(points_m: FloatArray, starts: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -121,7 +137,6 @@ def _lanes_only(network: RoadNetwork, lanes: np.ndarray) -> RoadNetwork:
     """The chosen lanes as they lie, without what leads from one to another."""
     counts = np.diff(network.point_start)[lanes]
     starts = np.concatenate([[0], np.cumsum(counts)])
-    rows = np.repeat(network.point_start[lanes] - starts[:-1], counts) + np.arange(starts[-1])
     none = np.full(len(lanes), -1, dtype=np.int32)
     return replace(
         network,
@@ -130,7 +145,7 @@ def _lanes_only(network: RoadNetwork, lanes: np.ndarray) -> RoadNetwork:
         is_internal=network.is_internal[lanes],
         width_m=network.width_m[lanes],
         speed_limit_mps=network.speed_limit_mps[lanes],
-        points_m=network.points_m[rows],
+        points_m=network.points_m[_point_rows(network, lanes)],
         point_start=starts.astype(np.int32),
         successor=np.zeros(0, dtype=np.int32),
         successor_start=np.zeros(len(lanes) + 1, dtype=np.int32),

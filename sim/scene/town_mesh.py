@@ -16,6 +16,7 @@ from hippodrome.sim.scene.land import field_mesh, ground_mesh, patch_mesh, place
 from hippodrome.sim.scene.lanes import cut_lanes
 from hippodrome.sim.scene.mesh import Mesh, merge
 from hippodrome.sim.scene.placement import Bools, Border, Shapes, borders, paved_area, quilt
+from hippodrome.sim.scene.relief import Relief, relief_of
 from hippodrome.sim.scene.roads import road_mesh
 from hippodrome.sim.scene.vegetation import hedge_mesh, place_trees, tree_mesh, treeline_mesh
 from hippodrome.sim.types import Town
@@ -32,6 +33,7 @@ class Land:
     border: Border  # where the land begins
     horizon: Border  # along which tree lines are placed
     road_points_m: FloatArray  # (n, 2) every few metres along all lanes
+    relief: Relief | None = None  # the ground's height; None: it is flat
     block: Block | None = None  # where things may stand; None: everywhere
 
     def holds(self, points_m: FloatArray) -> Bools:
@@ -41,9 +43,9 @@ class Land:
 
 def land_of(town: Town, origin_m: FloatArray) -> Land:
     """The land along all roads of a town."""
-    pieces = cut_lanes(town.network, origin_m)
+    pieces = cut_lanes(town.network, origin_m, town.heights_m)
     border = borders(pieces, town.network.is_internal)
-    return Land(town, border, border, pieces.middle_m())
+    return Land(town, border, border, pieces.middle_m(), None if town.heights_m is None else relief_of(pieces))
 
 
 def town_mesh(town: Town, seed: int, origin_m: FloatArray) -> tuple[Mesh, Mesh]:
@@ -63,13 +65,16 @@ def block_mesh(land: Land, seed: int, origin_m: FloatArray, block: Block) -> tup
         border=land.border.select(block.holds(border_m, BESIDE_M)),
         horizon=land.border.select(block.holds(border_m, HORIZON_M)),
         road_points_m=points_m[block.holds(points_m, GROUND_M)],
+        relief=land.relief,
         block=block,
     )
     if len(near.road_points_m) == 0:
         return merge([]), merge([])
     if near.town.network.lane_count == 0:
         paved = np.zeros(0, dtype=object)
-        return merge([treeline_mesh(near.horizon, paved, own[3], block.outside()), _ground(near, whole[7])]), merge([])
+        return _lifted(
+            merge([treeline_mesh(near.horizon, paved, own[3], block.outside()), _ground(near, whole[7])]), near
+        ), merge([])
     return _mesh(near, [*whole[:2], *own[2:7], whole[7]], origin_m)
 
 
@@ -88,15 +93,24 @@ def _mesh(land: Land, streams: Sequence[np.random.Generator], origin_m: FloatArr
     taken = np.concatenate([built, hedge_ground])
     signals = (town.signals_m - [*origin_m, 0.0])[land.holds(town.signals_m[:, :2] - origin_m)]
     posts = furniture_mesh(border, share(border.point_m), signals, town.left_hand, paved, taken, post)
-    road_bold, road_fine = (_inside(mesh, land) for mesh in road_mesh(town, origin_m, share, road))
+    road_bold, road_fine = (_inside(mesh, land) for mesh in road_mesh(town, origin_m, share, road, land.relief))
     house_bold, house_fine = building_mesh(buildings, build)
     field_bold, field_fine = field_mesh(fields, field)
     treelines = treeline_mesh(land.horizon, paved, plant, outside)
     grass = _ground(land, ground)
     # What hides other things comes first: the depth test then spares the shading of what is hidden, the ground last of all.
-    bold = merge([house_bold, hedges, road_bold, tree_mesh(trees, plant), treelines, field_bold, grass])
+    over, under = merge([house_bold, hedges]), [tree_mesh(trees, plant), treelines, field_bold, grass]
     verge = border.select(land.holds(border.point_m))
-    return bold, merge([house_fine, posts, road_fine, field_fine, patch_mesh(verge, ground)])
+    stand, lie = merge([house_fine, posts]), [field_fine, patch_mesh(verge, ground)]
+    if land.relief is not None:  # fields and patches are too flat for a ground that is not
+        under, lie = [part for part in under if part is not field_bold], []
+    lifted = (_lifted(merge(parts), land) for parts in ([over], under, [stand], lie))
+    over, low, stand, flat = lifted
+    return merge([over, road_bold, low]), merge([stand, road_fine, flat])
+
+
+def _lifted(mesh: Mesh, land: Land) -> Mesh:
+    return mesh if land.relief is None else land.relief.lifted(mesh)
 
 
 def _ground(land: Land, rng: np.random.Generator) -> Mesh:

@@ -59,7 +59,7 @@ class Pieces:
 
 
 def cut_lanes(network: RoadNetwork, origin_m: FloatArray, heights_m: FloatArray | None = None) -> Pieces:
-    """All lanes, internal ones too, in pieces of at most ``PIECE_M``, relative to the origin; ``heights_m`` (P,) of their points."""
+    """All lanes in pieces of at most ``PIECE_M``, relative to the origin; ``heights_m`` (P,) of the network's points."""
     counts = np.diff(network.point_start)
     owner = np.repeat(np.arange(network.lane_count, dtype=np.int32), counts)
     points = network.points_m - origin_m

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
+import shapely
 from pydantic import Field
 
 from hippodrome._files import replacing
@@ -73,7 +74,7 @@ def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
     net_file = work_dir / f"{spec.kind}-{hashlib.sha256(recipe.encode()).hexdigest()[:12]}.net.xml"
     if not net_file.exists():
         _write_plan_as_net(_plan(spec, rng_seed), spec, net_file)
-    return read_town(net_file, name=spec.kind)
+    return replace(read_town(net_file, name=spec.kind), rural=spec.kind == "rural")
 
 
 def _check_side(choice: Choice, left_hand: bool, network: Path) -> None:
@@ -99,6 +100,7 @@ def read_town(net_file: Path, name: str | None = None) -> Town:
         junction_polygons_m=_junction_polygons(net),
         signals_m=_signals(net, left_hand),
         left_hand=left_hand,
+        other_lanes_m=_other_lanes(net),
         notes=check_network(net, network, net_file),
     )
     heights_m = lane_heights_m(net, network)
@@ -208,6 +210,15 @@ def _strip_comments(file: Path) -> None:
 def _junction_polygons(net: SumoNet) -> tuple[FloatArray, ...]:
     """Paved outlines of the junctions that cars pass."""
     return tuple(np.array(node.getShape(), dtype=np.float64)[:, :2] for node in _paved_nodes(net))
+
+
+def _other_lanes(net: SumoNet) -> tuple[FloatArray, ...]:
+    """Outlines of all lanes that cars may not use, those of footpaths through junctions too."""
+    lanes = [lane for edge in net.getEdges() for lane in edge.getLanes() if not lane.allows("passenger")]
+    lines = [(np.array(lane.getShape(), dtype=np.float64).reshape(-1, 2), lane.getWidth()) for lane in lanes]
+    strips = [shapely.LineString(line).buffer(0.5 * width, cap_style="flat") for line, width in lines if len(line) > 1]
+    parts = shapely.get_parts(np.array(strips, dtype=object))
+    return tuple(shapely.get_coordinates(part.exterior) for part in parts if not part.is_empty)
 
 
 def _paved_nodes(net: SumoNet) -> list[SumoNet]:

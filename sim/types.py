@@ -20,6 +20,8 @@ class Town:
     signals_m: FloatArray  # (K, 3) x, y, heading of traffic lights and priority signs, to be drawn as poles
     left_hand: bool  # driving side
     notes: tuple[str, ...]  # what the network check found but could live with
+    rural: bool = False  # scattered houses among fields, and few lamps
+    other_lanes_m: tuple[FloatArray, ...] = ()  # (n, 2) outlines of lanes that are closed to cars: rails, cycleways, pavements
     heights_m: FloatArray | None = None  # (P,) of the network's points; None: the town is flat
     junction_heights_m: tuple[FloatArray, ...] | None = None  # (n,) of the junctions' outlines; None: the town is flat
 

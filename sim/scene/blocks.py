@@ -104,13 +104,14 @@ def town_near(town: Town, origin_m: FloatArray, blocks: list[Block], beyond_m: f
     network, outlines = town.network, town.junction_polygons_m
     heights, levels = town.heights_m, town.junction_heights_m
     lanes = np.flatnonzero(_touch(*_bounds(network.points_m, network.point_start[:-1]), low, high))
-    near = [i for i, line in enumerate(outlines) if np.all(line.max(axis=0) >= low) and np.all(line.min(axis=0) <= high)]
+    near = [i for i, outline in enumerate(outlines) if _reaches(outline, low, high)]
     signals = town.signals_m[_touch(town.signals_m[:, :2], town.signals_m[:, :2], low, high)]
     return replace(
         town,
         network=_lanes_only(network, lanes),
         junction_polygons_m=tuple(outlines[i] for i in near),
         signals_m=signals,
+        other_lanes_m=tuple(outline for outline in town.other_lanes_m if _reaches(outline, low, high)),
         heights_m=None if heights is None else heights[_point_rows(network, lanes)],
         junction_heights_m=None if levels is None else tuple(levels[i] for i in near),
     )
@@ -126,6 +127,10 @@ def _point_rows(network: RoadNetwork, lanes: np.ndarray) -> np.ndarray:
 
 def _bounds(points_m: FloatArray, starts: IntArray) -> tuple[FloatArray, FloatArray]:
     return np.minimum.reduceat(points_m, starts, axis=0), np.maximum.reduceat(points_m, starts, axis=0)
+
+
+def _reaches(outline_m: FloatArray, low_m: FloatArray, high_m: FloatArray) -> bool:
+    return bool(np.all(outline_m.max(axis=0) >= low_m) and np.all(outline_m.min(axis=0) <= high_m))
 
 
 def _touch(least_m: FloatArray, most_m: FloatArray, low_m: FloatArray, high_m: FloatArray) -> Bools:

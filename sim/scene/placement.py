@@ -63,6 +63,13 @@ def paved_area(town: Town, origin_m: FloatArray) -> tuple[Shapes, Shapes]:
     return np.concatenate([lanes, junctions]), junctions
 
 
+def other_lanes(town: Town, origin_m: FloatArray) -> Shapes:
+    """Polygons of the lanes that are closed to cars: nothing stands on them either."""
+    outlines = np.array([shapely.Polygon(outline - origin_m) for outline in town.other_lanes_m], dtype=object)
+    shapes: Shapes = shapely.make_valid(outlines)
+    return shapes
+
+
 def rectangles(centre_m: FloatArray, yaw_rad: FloatArray, length_m: FloatArray, width_m: FloatArray) -> Shapes:
     """Footprints (k,) as polygons."""
     x = 0.5 * length_m[:, None] * np.array([1, 1, -1, -1])

@@ -15,7 +15,7 @@ from hippodrome.sim.scene.furniture import furniture_mesh
 from hippodrome.sim.scene.land import field_mesh, ground_mesh, patch_mesh, place_fields
 from hippodrome.sim.scene.lanes import cut_lanes
 from hippodrome.sim.scene.mesh import Mesh, merge
-from hippodrome.sim.scene.placement import Bools, Border, Shapes, borders, paved_area, quilt
+from hippodrome.sim.scene.placement import Bools, Border, Shapes, borders, other_lanes, paved_area, quilt
 from hippodrome.sim.scene.relief import Relief, relief_of
 from hippodrome.sim.scene.roads import road_mesh
 from hippodrome.sim.scene.vegetation import hedge_mesh, place_trees, tree_mesh, treeline_mesh
@@ -82,7 +82,7 @@ def _mesh(land: Land, streams: Sequence[np.random.Generator], origin_m: FloatArr
     """What stands on the land, and the surfaces whose middles lie on it."""
     district, road, build, plant, hedge, field, post, ground = streams
     town, border, share = land.town, land.border, _town_share(land.town, district)
-    paved = paved_area(town, origin_m)[0]
+    paved = np.concatenate([paved_area(town, origin_m)[0], other_lanes(town, origin_m)])
     outside: Shapes = np.zeros(0, dtype=object) if land.block is None else land.block.outside()
     roads = np.concatenate([paved, outside])
     fields = place_fields(border, share(border.point_m), roads, field)
@@ -126,7 +126,7 @@ def _inside(mesh: Mesh, land: Land) -> Mesh:
 
 def _town_share(town: Town, rng: np.random.Generator) -> Callable[[FloatArray], FloatArray]:
     """How much of a town it is at (k, 2), 0..1: districts of a few hundred metres around the mean for this kind of town."""
-    mean = RURAL_SHARE if "rural" in town.name.lower() else TOWN_SHARE
+    mean = RURAL_SHARE if town.rural else TOWN_SHARE
     seed = int(rng.integers(2**63))
 
     def share(points_m: FloatArray) -> FloatArray:

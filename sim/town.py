@@ -8,6 +8,7 @@ import math
 import re
 import tempfile
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -34,6 +35,10 @@ from hippodrome.sim.types import Town
 LANE_WIDTH_M: Final = 3.2  # SUMO's default
 POLE_SETBACK_M: Final = 0.8  # signal poles stand this far outside the carriageway
 MANY_LANES: Final = 5_000  # sumolib takes some 5 kB for each
+# A disc that holds what the ego sweeps when it turns round between two lanes of 3.2 m, as measured.
+TURNING_RADIUS_M: Final = 7.9
+TURNING_ASIDE_M: Final = 2.2  # of its middle, from the road's axis
+TURNING_BACK_M: Final = 3.3  # and before the road's end
 MIN_RING_M: Final = 40.0  # a narrower ring leaves no room for houses between the streets
 
 CROSSING_RADIUS_M: Final = 6.0  # kerb radius, so that a right turn follows 7.6 m rather than SUMO's 5.6 m
@@ -101,6 +106,7 @@ def read_town(net_file: Path, name: str | None = None) -> Town:
         signals_m=_signals(net, left_hand),
         left_hand=left_hand,
         other_lanes_m=_other_lanes(net),
+        turning_places_m=tuple(_turning_places(net, left_hand)),
         notes=check_network(net, network, net_file),
     )
     heights_m = lane_heights_m(net, network)
@@ -219,6 +225,24 @@ def _other_lanes(net: SumoNet) -> tuple[FloatArray, ...]:
     strips = [shapely.LineString(line).buffer(0.5 * width, cap_style="flat") for line, width in lines if len(line) > 1]
     parts = shapely.get_parts(np.array(strips, dtype=object))
     return tuple(shapely.get_coordinates(part.exterior) for part in parts if not part.is_empty)
+
+
+def _turning_places(net: SumoNet, left_hand: bool) -> Iterator[FloatArray]:
+    """Discs (24, 2) at dead ends, on the side to which cars swing out."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    circle = TURNING_RADIUS_M * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    for edge in net.getEdges(withInternal=False):
+        onward = [after for after, links in edge.getOutgoing().items() if any(link.allows("passenger") for link in links)]
+        if len(onward) != 1 or onward[0].getToNode() is not edge.getFromNode():
+            continue
+        incoming = [other for other in edge.getToNode().getIncoming() if other.getFunction() != "internal"]
+        if onward[0].getFromNode() is not edge.getToNode() or len(incoming) > 1:
+            continue
+        back, here = onward[0].getLanes()[-1].getShape()[0], edge.getLanes()[-1].getShape()[-2:]
+        ahead = np.subtract(here[1], here[0])
+        ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
+        aside = np.array([-ahead[1], ahead[0]]) * (-1.0 if left_hand else 1.0)
+        yield 0.5 * np.add(here[1], back) + TURNING_ASIDE_M * aside - TURNING_BACK_M * ahead + circle
 
 
 def _paved_nodes(net: SumoNet) -> list[SumoNet]:

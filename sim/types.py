@@ -22,6 +22,7 @@ class Town:
     notes: tuple[str, ...]  # what the network check found but could live with
     rural: bool = False  # scattered houses among fields, and few lamps
     other_lanes_m: tuple[FloatArray, ...] = ()  # (n, 2) outlines of lanes that are closed to cars: rails, cycleways, pavements
+    turning_places_m: tuple[FloatArray, ...] = ()  # (n, 2) outlines of the paving at dead ends, where cars turn round
     heights_m: FloatArray | None = None  # (P,) of the network's points; None: the town is flat
     junction_heights_m: tuple[FloatArray, ...] | None = None  # (n,) of the junctions' outlines; None: the town is flat
 

@@ -111,6 +111,7 @@ def town_near(town: Town, origin_m: FloatArray, blocks: list[Block], beyond_m: f
         network=_lanes_only(network, lanes),
         junction_polygons_m=tuple(outlines[i] for i in near),
         signals_m=signals,
+        turning_places_m=tuple(outline for outline in town.turning_places_m if _reaches(outline, low, high)),
         other_lanes_m=tuple(outline for outline in town.other_lanes_m if _reaches(outline, low, high)),
         heights_m=None if heights is None else heights[_point_rows(network, lanes)],
         junction_heights_m=None if levels is None else tuple(levels[i] for i in near),

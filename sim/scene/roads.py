@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.scene.lanes import PIECE_M, PROBE_M, Beside, Pieces, beside, cut_lanes
 from hippodrome.sim.scene.mesh import Mesh, Surface, merge, placed, polygons
-from hippodrome.sim.scene.placement import Bools, Shapes, clear_of, paved_area
+from hippodrome.sim.scene.placement import Bools, Shapes, clear_of, paved_area, turning_places
 from hippodrome.sim.scene.relief import Relief, rim_mesh, stands_low, underside_mesh
 from hippodrome.sim.types import Town
 
@@ -57,11 +57,13 @@ def road_mesh(
     ]
     fine = []
     roads, junctions = paved_area(town, origin_m)
+    turned_at = turning_places(town, origin_m)
     open_road = ~network.is_internal[pieces.lane]
     for side in (1, -1):
         kind, other = beside(pieces, network.is_internal, side)
         turn = beside(pieces, network.is_internal, side, probe_m=0.05)[0] == Beside.NOTHING  # not between two lanes that part
         edge = pieces.select((kind == Beside.NOTHING) & (open_road | (turn & ~_leads_into(pieces, side, junctions))))
+        edge = edge.select(~_leads_into(edge, side, turned_at))
         paved = (town_share(edge.middle_m()) > PAVED_SHARE) & _has_room(edge, side, roads)
         low = stands_low(edge, relief)
         bold += [_verge(edge.select(~paved & low), side), _pavement(edge.select(paved & low), side)]
@@ -176,15 +178,21 @@ def _stop_lines(town: Town, origin_m: FloatArray) -> Mesh:
 
 def _junctions(town: Town, origin_m: FloatArray) -> Mesh:
     """The junctions' outlines, triangulated; where roads climb, each corner at the height of the nearest one of its outline."""
-    if town.junction_heights_m is None:
-        return _outlines(town.junction_polygons_m, origin_m)
-    parts = []
+    turned_at = _outlines(town.turning_places_m, origin_m)
+    if town.junction_heights_m is None or town.heights_m is None:
+        return merge([_outlines(town.junction_polygons_m, origin_m), turned_at])
+    nearest = KDTree(town.network.points_m - origin_m).query(turned_at.vertices_m[:, :2])[1]
+    parts = [_raised(turned_at, town.heights_m[nearest])]
     for outline_m, heights_m in zip(town.junction_polygons_m, town.junction_heights_m, strict=True):
         mesh = _outlines((outline_m,), origin_m)
         nearest = KDTree(outline_m - origin_m).query(mesh.vertices_m[:, :2])[1]
-        up = np.column_stack([np.zeros((len(nearest), 2)), heights_m[nearest]]).astype(np.float32)
-        parts.append(replace(mesh, vertices_m=mesh.vertices_m + up))
+        parts.append(_raised(mesh, heights_m[nearest]))
     return merge(parts)
+
+
+def _raised(mesh: Mesh, by_m: FloatArray) -> Mesh:
+    up = np.column_stack([np.zeros((len(by_m), 2)), by_m]).astype(np.float32)
+    return replace(mesh, vertices_m=mesh.vertices_m + up)
 
 
 def _outlines(outlines_m: tuple[FloatArray, ...], origin_m: FloatArray) -> Mesh:

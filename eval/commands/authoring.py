@@ -45,7 +45,7 @@ def add_scenario_command(commands: Any) -> None:
     new.add_argument(
         "--around", metavar="LAT,LON",
         help="cut a circle out of a large map, with this place in degrees as its middle (or xy:X,Y, in the metres of a SUMO "
-             "network); the network of the circle is written beside the scenario",
+             "network), written beside the scenario (default: all of the map)",
     )  # fmt: skip
     new.add_argument("--radius", type=float, default=1000.0, metavar="METRES", help="of the circle of --around (default: 1000)")
     new.add_argument("--out", type=Path, metavar="FILE", help="file for the scenario (default: NAME.yaml)")

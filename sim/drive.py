@@ -11,8 +11,9 @@ import numpy as np
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray
-from hippodrome.sim.ego import LENGTH_M, REAR_AXLE_TO_FRONT_M, EgoSpec, Track, follow, wander_m
+from hippodrome.sim.ego import LENGTH_M, REAR_AXLE_TO_FRONT_M, WHEELBASE_M, EgoSpec, Track, follow, wander_m
 from hippodrome.sim.lane_log import driven_edges, lane_pieces
+from hippodrome.sim.net_heights import heights_along_m, pitch_rad
 from hippodrome.sim.path import Piece, piece_starts, sample_count, smooth_path
 from hippodrome.sim.pilot import DriveLog, Pilot
 from hippodrome.sim.sumo_run import SUMO_STEP_S, BackgroundTraffic, sumo_run
@@ -32,13 +33,18 @@ def simulate_drive(town: Town, tour: TourSpec, traffic: TrafficSpec, ego: EgoSpe
     rng_tour, rng_traffic, rng_wander = (np.random.default_rng([seed, stream]) for stream in range(3))
     with sumo_run(town.net_file, vehicle_types_xml(ego.accel_mps2, ego.decel_mps2, LENGTH_M), seed):
         roamed_m = max(float(graph.length_m[area].sum()), ROAM_PER_VEHICLE_M * traffic.vehicles)
-        others = BackgroundTraffic(traffic, town.network, graph, toured_area(graph, roamed_m), rng_traffic)
+        roamed, climbs = toured_area(graph, roamed_m), town.heights_m is not None
+        others = BackgroundTraffic(traffic, town.network, graph, roamed, rng_traffic, climbs)
         log = Pilot(town.network, graph, area, tour, ego, rng_tour).drive(others)
-    return _as_drive(town.network, graph, log, ego, rng_wander)
+    return _as_drive(town, graph, log, ego, rng_wander)
 
 
-def _as_drive(network: RoadNetwork, graph: TourGraph, log: DriveLog, ego: EgoSpec, rng: np.random.Generator) -> Drive:
-    """The car's motion along SUMO's path, and where on the lanes it was."""
+def _as_drive(town: Town, graph: TourGraph, log: DriveLog, ego: EgoSpec, rng: np.random.Generator) -> Drive:
+    """The car's motion along SUMO's path, and where on the lanes it was.
+
+    The bicycle is driven seen from above; SUMO's speeds are along the slope, and so are the drive's.
+    """
+    network = town.network
     pieces, front_m = lane_pieces(network, log.lanes(), from_lane_start=True)
     aside = wander_m(sample_count(pieces), ego.lateral_wander_m, rng) if ego.lateral_wander_m > 0.0 else None
     t_s: FloatArray = np.arange(round((len(front_m) - 1) * SUMO_STEP_S / DRIVE_STEP_S) + 1, dtype=np.float64) * DRIVE_STEP_S
@@ -48,17 +54,27 @@ def _as_drive(network: RoadNetwork, graph: TourGraph, log: DriveLog, ego: EgoSpe
     number = {int(edge): k for k, edge in enumerate(graph.edges)}
     edges = [number[edge] for edge in driven_edges(network, pieces) if edge in number]
     coverage, revisit_share = coverage_and_revisits(edges, graph)
+    lane = np.array([piece.lane for piece in pieces], dtype=np.int32)[owner]
+    position_m = _lane_positions_m(network, pieces, track, owner)
+    heights_m = None if town.heights_m is None else heights_along_m(network, town.heights_m, lane, position_m)
     return Drive(
         t_s=t_s,
         poses_m=np.concatenate([track.poses_m[:, :2], wrap(track.poses_m[:, 2:])], axis=1),
-        speed_mps=track.speed_mps,
+        speed_mps=track.speed_mps if heights_m is None else track.speed_mps / np.cos(drive_pitch_rad(track.poses_m, heights_m)),
         yaw_rate_radps=track.yaw_rate_radps,
-        lane=np.array([piece.lane for piece in pieces], dtype=np.int32)[owner],
-        lane_position_m=_lane_positions_m(network, pieces, track, owner),
+        lane=lane,
+        lane_position_m=position_m,
         traffic=log.traffic(),
         coverage=coverage,
         revisit_share=revisit_share,
+        heights_m=heights_m,
     )
+
+
+def drive_pitch_rad(poses_m: FloatArray, heights_m: FloatArray) -> FloatArray:
+    """Pitch (N,) of the ego, nose up positive, along poses (N, 3) and the road's heights (N,)."""
+    steps = np.linalg.norm(np.diff(poses_m[:, :2], axis=0), axis=1)
+    return pitch_rad(np.concatenate([[0.0], np.cumsum(steps)]), heights_m, WHEELBASE_M)
 
 
 def _owners(pieces: Sequence[Piece], track: Track) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

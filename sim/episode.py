@@ -11,6 +11,7 @@ import numpy as np
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import FloatArray, Frame, GroundTruth, IntArray, Observation, Step
+from hippodrome.sim.drive import drive_pitch_rad
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scene.conditions import Conditions, apply_camera
 from hippodrome.sim.self_motion import SelfMotion
@@ -80,11 +81,20 @@ def draw_frame(
     step = samples.frame_steps[number]
     vehicles = traffic_at(drive.traffic, float(samples.t_s[step]))
     rng = np.random.default_rng([seed, number])
+    pose_m = np.concatenate([samples.poses_m[step], _height_and_pitch(drive, float(samples.t_s[step]))])
     if renderer.camera.stereo_baseline_m is None:
-        images: tuple[Frame, ...] = (renderer.render(samples.poses_m[step], *vehicles),)
+        images: tuple[Frame, ...] = (renderer.render(pose_m, *vehicles),)
     else:
-        images = renderer.render_stereo(samples.poses_m[step], *vehicles)
+        images = renderer.render_stereo(pose_m, *vehicles)
     return tuple(apply_camera(image, conditions, rng) for image in images)
+
+
+def _height_and_pitch(drive: Drive, t_s: float) -> FloatArray:
+    """Height [m] and pitch [rad] of the ego at a time; nothing (0,) in a flat town."""
+    if drive.heights_m is None:
+        return np.zeros(0)
+    pitch_rad = drive_pitch_rad(drive.poses_m, drive.heights_m)
+    return np.array([np.interp(t_s, drive.t_s, drive.heights_m), np.interp(t_s, drive.t_s, pitch_rad)])
 
 
 def episode(renderer: FrameRenderer, drive: Drive, samples: Samples, conditions: Conditions, seed: int) -> Iterator[Step]:

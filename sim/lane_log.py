@@ -27,12 +27,15 @@ class LaneLog:
     speed_mps: FloatArray  # (S,)
 
 
-def lane_pieces(network: RoadNetwork, log: LaneLog, from_lane_start: bool = False) -> tuple[list[Piece], FloatArray]:
+def lane_pieces(
+    network: RoadNetwork, log: LaneLog, from_lane_start: bool = False, lengths_m: FloatArray | None = None
+) -> tuple[list[Piece], FloatArray]:
     """The chain of stretches, lanes skipped between two steps included, and the distance (S,) driven along it at each step.
 
-    The chain begins at the first position, or with ``from_lane_start`` at the start of that lane.
+    The chain begins at the first position, or with ``from_lane_start`` at the start of that lane. ``lengths_m`` (L,) are the
+    network's ``lane_lengths_m()``, where the caller has them: on a large network they take longer than the rest.
     """
-    lengths = network.lane_lengths_m()
+    lengths = network.lane_lengths_m() if lengths_m is None else lengths_m
     groups = _groups(log)
     pieces: list[Piece] = []
     piece_of_group: list[int] = []

@@ -93,8 +93,12 @@ def import_recipe(source: Path, driving_side: Choice = "auto") -> str:
     return hashlib.sha256(repr(recipe).encode()).hexdigest()[:12]
 
 
-def import_map(source: Path, net_file: Path, driving_side: Choice = "auto") -> tuple[str, ...]:
+def import_map(
+    source: Path, net_file: Path, driving_side: Choice = "auto", more_options: tuple[str, ...] = ()
+) -> tuple[str, ...]:
     """Write ``source`` as the SUMO network ``net_file`` (.net.xml.gz); the same map, the same bytes.
+
+    ``more_options`` are netconvert's, beside those of this project.
 
     Returns what netconvert warned of and what was done about it, one line for each kind of warning.
 
@@ -110,16 +114,16 @@ def import_map(source: Path, net_file: Path, driving_side: Choice = "auto") -> t
         plain, made = folder / f"map{ending}", folder / "made.net.xml"
         _unpack(source, plain)
         root_of(plain, named=source)
-        notes = _convert(source, plain, made, driving_side)
+        notes = _convert(source, plain, made, driving_side, more_options)
         with replacing(net_file) as temporary:
             temporary.write_bytes(gzip.compress(_without_comments(made.read_text(encoding="utf-8")).encode(), mtime=0))
     return notes
 
 
-def _convert(source: Path, plain: Path, made: Path, choice: Choice) -> tuple[str, ...]:
+def _convert(source: Path, plain: Path, made: Path, choice: Choice, more: tuple[str, ...] = ()) -> tuple[str, ...]:
     """netconvert's network of a map, and the notes on it. Roads that join no other are kept where there is nothing else."""
     convert = _convert_opendrive if plain.suffix == ".xodr" else _convert_osm
-    notes = convert(source, plain, made, choice)
+    notes = convert(source, plain, made, choice, more)
     if not _has_roads(made):
         raise HippodromeError(
             f"{source}: holds no roads for cars (footways, tracks and service roads are none); choose a larger extract"
@@ -127,9 +131,9 @@ def _convert(source: Path, plain: Path, made: Path, choice: Choice) -> tuple[str
     return notes
 
 
-def _convert_osm(source: Path, plain: Path, made: Path, choice: Choice) -> tuple[str, ...]:
+def _convert_osm(source: Path, plain: Path, made: Path, choice: Choice, more: tuple[str, ...]) -> tuple[str, ...]:
     side = osm_side(plain) if choice == "auto" else DrivingSide(choice)
-    options = (*OSM_OPTIONS, *(LEFT_HAND if side.side == "left" else ()))
+    options = (*OSM_OPTIONS, *(LEFT_HAND if side.side == "left" else ()), *more)
     notes = _netconvert(source, plain, made, options)
     if not _has_roads(made):
         made.unlink(missing_ok=True)
@@ -140,7 +144,7 @@ def _convert_osm(source: Path, plain: Path, made: Path, choice: Choice) -> tuple
     return (*_side_notes(side), *notes)
 
 
-def _convert_opendrive(source: Path, plain: Path, made: Path, choice: Choice) -> tuple[str, ...]:
+def _convert_opendrive(source: Path, plain: Path, made: Path, choice: Choice, more: tuple[str, ...]) -> tuple[str, ...]:
     """Arcs are followed finely; where netconvert cannot do that, with its own default."""
     side = opendrive_side(plain) if choice == "auto" else DrivingSide(choice)
     straightened = with_arcs_for_arcs(plain)
@@ -149,7 +153,7 @@ def _convert_opendrive(source: Path, plain: Path, made: Path, choice: Choice) ->
             with_lanes_swapped(plain)
         except HippodromeError as error:
             raise HippodromeError(f"{source}: {error}; write it again with the tool that made it") from error
-    options = (*OPENDRIVE_OPTIONS, *(LEFT_HAND if side.side == "left" else ()))
+    options = (*OPENDRIVE_OPTIONS, *(LEFT_HAND if side.side == "left" else ()), *more)
     arcs = (f"{IMPORT} {straightened} spiral(s) of constant curvature were read as arcs or lines",) if straightened else ()
     try:
         notes = _netconvert(source, plain, made, options)

@@ -42,7 +42,7 @@ class DriveLog:
     speed_mps: list[float] = field(default_factory=list)
     start: list[int] = field(default_factory=lambda: [0])
     vehicle: list[int] = field(default_factory=list)
-    poses_m: list[tuple[float, float, float]] = field(default_factory=list)
+    poses_m: list[tuple[float, ...]] = field(default_factory=list)
     kind: list[int] = field(default_factory=list)
 
     def lanes(self, last: int = 0) -> LaneLog:
@@ -54,7 +54,7 @@ class DriveLog:
             t_s=np.arange(len(self.lane), dtype=np.float64) * SUMO_STEP_S,
             start=np.array(self.start, dtype=np.int32),
             vehicle=np.array(self.vehicle, dtype=np.int32),
-            poses_m=np.array(self.poses_m, dtype=np.float64).reshape(-1, 3),
+            poses_m=np.array(self.poses_m, dtype=np.float64).reshape(-1, len(self.poses_m[0]) if self.poses_m else 3),
             kind=np.array(self.kind, dtype=np.uint8),
         )
 
@@ -171,7 +171,7 @@ class Pilot:
     def _look_ahead(self) -> None:
         """On a new lane: the comfortable speed along it and what follows."""
         lane, onward = self._log.lane[-1], self._onward_edges()
-        pieces, _ = lane_pieces(self._network, self._log.lanes(self._steps_behind()))
+        pieces, _ = lane_pieces(self._network, self._log.lanes(self._steps_behind()), lengths_m=self._lengths_m)
         here = pieces[-1]
         pieces[-1] = Piece(lane, here.begin_m, float(self._lengths_m[lane]), here.side_step, here.speed_mps)
         ahead = lanes_ahead(self._network, lane, onward, SIGHT_AHEAD_M)
@@ -222,7 +222,7 @@ class Pilot:
         reachable = sorted({edge for edge in after if edge >= 0})
         if not reachable:
             return
-        pieces, distance = lane_pieces(self._network, self._log.lanes())
+        pieces, distance = lane_pieces(self._network, self._log.lanes(), lengths_m=self._lengths_m)
         edges = [number[edge] for edge in driven_edges(self._network, pieces) if edge in number]
         visits = np.bincount(edges, minlength=len(self._graph.edges)).astype(np.int32)
         start = min(reachable, key=lambda edge: (edge not in self._area, visits[edge]))

@@ -169,7 +169,8 @@ def _renderer(plan: RecordingPlan) -> FrameRenderer:
     key = (plan.scenario, plan.role)
     if not _live or _live[0][0] != key:
         close_renderer()
-        scene = build_scene(plan.town(), plan.scenario.seed, plan.drive_spec.conditions)
+        poses_m = _episode_of(plan.folder())[0].poses_m
+        scene = build_scene(plan.town(), plan.scenario.seed, plan.drive_spec.conditions, poses_m)
         _live.append((key, FrameRenderer(scene, plan.scenario.camera)))
     return _live[0][1]
 
@@ -207,14 +208,15 @@ def record(plan: RecordingPlan) -> Recording:
 
 def _write_drive(path: Path, drive: Drive) -> None:
     log = {f"traffic_{field.name}": getattr(drive.traffic, field.name) for field in fields(TrafficLog)}
-    write_arrays(path, {**{field.name: getattr(drive, field.name) for field in fields(Drive) if field.name != "traffic"}, **log})
+    own = {field.name: getattr(drive, field.name) for field in fields(Drive) if field.name != "traffic"}
+    write_arrays(path, {**{name: value for name, value in own.items() if value is not None}, **log})
 
 
 def _read_drive(path: Path) -> Drive:
     log_names = [field.name for field in fields(TrafficLog)]
-    names = [field.name for field in fields(Drive) if field.name != "traffic"]
+    names = [field.name for field in fields(Drive) if field.name not in ("traffic", "heights_m")]
     try:
-        arrays = read_arrays(path, [*names, *(f"traffic_{name}" for name in log_names)])
+        arrays = read_arrays(path, [*names, *(f"traffic_{name}" for name in log_names)], optional=["heights_m"])
         log = TrafficLog(**{name: arrays.pop(f"traffic_{name}") for name in log_names})
         coverage, revisit_share = float(arrays.pop("coverage")), float(arrays.pop("revisit_share"))
     except Exception as error:  # as of the samples

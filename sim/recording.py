@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
@@ -125,14 +125,17 @@ def read_samples(path: Path) -> Samples:
     return Samples(**arrays, lane_ids=lane_ids)
 
 
-def read_arrays(path: Path, names: list[str]) -> dict[str, np.ndarray[Any, np.dtype[Any]]]:
-    """Arrays of an npz file that are stored as they are: a packed one could claim any size and is refused."""
+def read_arrays(path: Path, names: list[str], optional: Sequence[str] = ()) -> dict[str, np.ndarray[Any, np.dtype[Any]]]:
+    """Arrays of an npz file that are stored as they are: a packed one could claim any size and is refused.
+
+    Those of ``optional`` are left out where the file has none.
+    """
     blob = read_bounded(path, MAX_ARRAY_BYTES)
     with zipfile.ZipFile(io.BytesIO(blob)) as archive:
         if any(item.compress_type != zipfile.ZIP_STORED or item.file_size > len(blob) for item in archive.infolist()):
             raise ValueError("packed arrays")
     with np.load(io.BytesIO(blob), allow_pickle=False) as data:
-        return {name: data[name] for name in names}
+        return {name: data[name] for name in [*names, *(name for name in optional if name in data)]}
 
 
 def _said(error: Exception) -> str:

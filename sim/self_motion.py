@@ -101,7 +101,9 @@ def sense_self_motion(drive: Drive, rate_hz: float, noise: SelfMotionNoise, rng:
 
 
 def _arc_length_m(drive: Drive) -> FloatArray:
-    steps = np.linalg.norm(np.diff(drive.poses_m[:, :2], axis=0), axis=1)
+    """The way (N,) that the wheels rolled: up and down slopes too."""
+    places = drive.poses_m[:, :2] if drive.heights_m is None else np.column_stack([drive.poses_m[:, :2], drive.heights_m])
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 

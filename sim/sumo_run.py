@@ -72,8 +72,15 @@ class BackgroundTraffic:
     """Keeps a number of vehicles on random trips, and tells where those near the ego are."""
 
     def __init__(
-        self, spec: TrafficSpec, network: RoadNetwork, graph: TourGraph, area: IntArray, rng: np.random.Generator
+        self,
+        spec: TrafficSpec,
+        network: RoadNetwork,
+        graph: TourGraph,
+        area: IntArray,
+        rng: np.random.Generator,
+        in_space: bool = False,
     ) -> None:
+        self._in_space = in_space
         area = _without_shared_lanes(network, graph, area)
         self._network, self._graph, self._area, self._rng = network, graph, area, rng
         self._wanted = min(spec.vehicles, int(graph.length_m[area].sum() / ROOM_PER_VEHICLE_M))
@@ -88,10 +95,10 @@ class BackgroundTraffic:
             add_vehicle(f"b{number}", f"kind{kind}", self._network, trip, "random_free")
             self._kind.append(kind)
 
-    def near(self, x_m: float, y_m: float) -> tuple[list[int], list[tuple[float, float, float]], list[int]]:
-        """Identities, poses of the centres and kinds of the vehicles within ``SIGHT_M``."""
+    def near(self, x_m: float, y_m: float) -> tuple[list[int], list[tuple[float, ...]], list[int]]:
+        """Identities, poses of the centres (5 numbers where roads climb) and kinds of the vehicles within ``SIGHT_M``."""
         ids: list[int] = []
-        poses: list[tuple[float, float, float]] = []
+        poses: list[tuple[float, ...]] = []
         kinds: list[int] = []
         for name in libsumo.vehicle.getIDList():
             if name == EGO:
@@ -103,9 +110,16 @@ class BackgroundTraffic:
             heading = math.radians(90.0 - libsumo.vehicle.getAngle(name))
             half = 0.5 * float(VEHICLE_SIZES_M[self._kind[number], 0])
             ids.append(number)
-            poses.append((x - half * math.cos(heading), y - half * math.sin(heading), heading))
+            poses.append((x - half * math.cos(heading), y - half * math.sin(heading), heading, *self._height(name, half)))
             kinds.append(self._kind[number])
         return ids, poses, kinds
+
+    def _height(self, name: str, half_m: float) -> tuple[float, ...]:
+        """Height [m] and pitch [rad] of a vehicle's centre, ``half_m`` behind its front; nothing in a flat town."""
+        if not self._in_space:
+            return ()
+        pitch_rad = math.radians(libsumo.vehicle.getSlope(name))
+        return libsumo.vehicle.getPosition3D(name)[2] - half_m * math.sin(pitch_rad), pitch_rad
 
 
 def _without_shared_lanes(network: RoadNetwork, graph: TourGraph, area: IntArray) -> IntArray:

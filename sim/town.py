@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import math
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
+import shapely
 from pydantic import Field
 
 from hippodrome._files import replacing
@@ -21,6 +24,7 @@ from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
 from hippodrome.sim.map_import import LEFT_HAND, sumo_network
 from hippodrome.sim.net_file import SumoNet, check_places_to_wait, is_left_hand, load_net
+from hippodrome.sim.net_heights import crossings_without_height, lane_heights_m
 from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
@@ -30,6 +34,11 @@ from hippodrome.sim.types import Town
 
 LANE_WIDTH_M: Final = 3.2  # SUMO's default
 POLE_SETBACK_M: Final = 0.8  # signal poles stand this far outside the carriageway
+MANY_LANES: Final = 5_000  # sumolib takes some 5 kB for each
+# A disc that holds what the ego sweeps when it turns round between two lanes of 3.2 m, as measured.
+TURNING_RADIUS_M: Final = 7.9
+TURNING_ASIDE_M: Final = 2.2  # of its middle, from the road's axis
+TURNING_BACK_M: Final = 3.3  # and before the road's end
 MIN_RING_M: Final = 40.0  # a narrower ring leaves no room for houses between the streets
 
 CROSSING_RADIUS_M: Final = 6.0  # kerb radius, so that a right turn follows 7.6 m rather than SUMO's 5.6 m
@@ -70,7 +79,7 @@ def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
     net_file = work_dir / f"{spec.kind}-{hashlib.sha256(recipe.encode()).hexdigest()[:12]}.net.xml"
     if not net_file.exists():
         _write_plan_as_net(_plan(spec, rng_seed), spec, net_file)
-    return read_town(net_file, name=spec.kind)
+    return replace(read_town(net_file, name=spec.kind), rural=spec.kind == "rural")
 
 
 def _check_side(choice: Choice, left_hand: bool, network: Path) -> None:
@@ -89,15 +98,28 @@ def read_town(net_file: Path, name: str | None = None) -> Town:
     check_places_to_wait(net, net_file)
     network = road_network(net, net_file)
     left_hand = is_left_hand(net_file)
-    return Town(
+    town = Town(
         name=name or net_file.name.split(".")[0],
         net_file=net_file,
         network=network,
         junction_polygons_m=_junction_polygons(net),
         signals_m=_signals(net, left_hand),
         left_hand=left_hand,
+        other_lanes_m=_other_lanes(net),
+        turning_places_m=tuple(_turning_places(net, left_hand)),
         notes=check_network(net, network, net_file),
     )
+    heights_m = lane_heights_m(net, network)
+    notes = (*town.notes, *crossings_without_height(net, network, heights_m))
+    if heights_m is not None:
+        outlines = (np.array(node.getShape3D(), dtype=np.float64) for node in _paved_nodes(net))
+        town = replace(town, heights_m=heights_m, junction_heights_m=tuple(outline[:, 2] for outline in outlines))
+    town = replace(town, notes=notes)
+    large = network.lane_count > MANY_LANES
+    del net
+    if large:
+        gc.collect()  # sumolib's objects hold one another: hundreds of megabytes would wait for the next collection
+    return town
 
 
 def _plan(spec: TownSpec, rng_seed: int) -> Plan:
@@ -193,8 +215,39 @@ def _strip_comments(file: Path) -> None:
 
 def _junction_polygons(net: SumoNet) -> tuple[FloatArray, ...]:
     """Paved outlines of the junctions that cars pass."""
-    shapes = [node.getShape() for node in net.getNodes() if any(edge.allows("passenger") for edge in node.getIncoming())]
-    return tuple(np.array(shape, dtype=np.float64)[:, :2] for shape in shapes if len(shape) >= 3)
+    return tuple(np.array(node.getShape(), dtype=np.float64)[:, :2] for node in _paved_nodes(net))
+
+
+def _other_lanes(net: SumoNet) -> tuple[FloatArray, ...]:
+    """Outlines of all lanes that cars may not use, those of footpaths through junctions too."""
+    lanes = [lane for edge in net.getEdges() for lane in edge.getLanes() if not lane.allows("passenger")]
+    lines = [(np.array(lane.getShape(), dtype=np.float64).reshape(-1, 2), lane.getWidth()) for lane in lanes]
+    strips = [shapely.LineString(line).buffer(0.5 * width, cap_style="flat") for line, width in lines if len(line) > 1]
+    parts = shapely.get_parts(np.array(strips, dtype=object))
+    return tuple(shapely.get_coordinates(part.exterior) for part in parts if not part.is_empty)
+
+
+def _turning_places(net: SumoNet, left_hand: bool) -> Iterator[FloatArray]:
+    """Discs (24, 2) at dead ends, on the side to which cars swing out."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    circle = TURNING_RADIUS_M * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    for edge in net.getEdges(withInternal=False):
+        onward = [after for after, links in edge.getOutgoing().items() if any(link.allows("passenger") for link in links)]
+        if len(onward) != 1 or onward[0].getToNode() is not edge.getFromNode():
+            continue
+        incoming = [other for other in edge.getToNode().getIncoming() if other.getFunction() != "internal"]
+        if onward[0].getFromNode() is not edge.getToNode() or len(incoming) > 1:
+            continue
+        back, here = onward[0].getLanes()[-1].getShape()[0], edge.getLanes()[-1].getShape()[-2:]
+        ahead = np.subtract(here[1], here[0])
+        ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
+        aside = np.array([-ahead[1], ahead[0]]) * (-1.0 if left_hand else 1.0)
+        yield 0.5 * np.add(here[1], back) + TURNING_ASIDE_M * aside - TURNING_BACK_M * ahead + circle
+
+
+def _paved_nodes(net: SumoNet) -> list[SumoNet]:
+    passed = (node for node in net.getNodes() if any(edge.allows("passenger") for edge in node.getIncoming()))
+    return [node for node in passed if len(node.getShape()) >= 3]
 
 
 def _signals(net: SumoNet, left_hand: bool) -> FloatArray:

@@ -18,6 +18,7 @@ from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.files.scenarios import PACKAGE, located
 from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
+from hippodrome.sim.net_cut import Around, cut_network, import_options
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import tour_graph
 from hippodrome.sim.town import TownSpec, build_town
@@ -69,7 +70,7 @@ class Draft:
     notes: tuple[str, ...]  # what is odd about the network, with place and cure
 
 
-def new_scenario(name: str, source: str, path: Path, driving_side: Choice = "auto") -> Draft:
+def new_scenario(name: str, source: str, path: Path, driving_side: Choice = "auto", around: Around | None = None) -> Draft:
     """Write a scenario whose values suit a road network, and say what they are.
 
     Args:
@@ -78,20 +79,23 @@ def new_scenario(name: str, source: str, path: Path, driving_side: Choice = "aut
             once: its network is written beside the scenario.
         path: The scenario's file.
         driving_side: Where traffic keeps in a generated town or an imported map; ``auto``: as the map says, else right.
+        around: The circle of the map that is meant, which is then written beside the scenario; None: all of it.
 
     Raises:
         HippodromeError: The source or the name cannot be used, or a file that would be written exists.
     """
-    network = path.with_name(f"{path.stem}.net.xml.gz") if _is_imported(source) else None
+    if around and source in KINDS:
+        raise HippodromeError(f"--around {around.first:g},{around.second:g}: '{source}' is generated; only a map is cut out of")
+    network = path.with_name(f"{path.stem}.net.xml.gz") if around or _is_imported(source) else None
     for target in filter(None, (path, network)):
         if target.exists():
             raise HippodromeError(f"{target}: exists already; choose another --out, or remove it first")
     with temporary_folder() as folder:
         imported = folder / network.name if network else None
-        imported_notes = import_map(Path(source), imported, driving_side) if imported else ()
+        imported_notes = _import(source, imported, driving_side, around) if imported else ()
         town = _town(source, imported, folder, driving_side)
         draft = draft_for(town)
-        text = scenario_text(name, source, path, draft, driving_side)
+        text = scenario_text(name, source, path, draft, driving_side, around)
         trial = folder / path.name
         trial.write_text(text, encoding="utf-8")
         scenario = _checked(trial, path)
@@ -99,6 +103,18 @@ def new_scenario(name: str, source: str, path: Path, driving_side: Choice = "aut
             write_atomically(network, imported.read_bytes())
     write_atomically(path, text.encode())
     return replace(draft, notes=(*imported_notes, *network_notes(scenario, town)))
+
+
+def _import(source: str, imported: Path, driving_side: Choice, around: Around | None) -> tuple[str, ...]:
+    """Write the map, or the circle of it, as a SUMO network; the notes on it."""
+    if is_foreign(source):
+        return import_map(Path(source), imported, driving_side, import_options(around) if around else ())
+    if around:
+        found = located(Path(source), "--from")
+        if not found.is_file():
+            raise HippodromeError(f"--from {source}: neither a kind of town ({', '.join(KINDS)}) nor a file")
+        cut_network(found, imported, around)
+    return ()
 
 
 def draft_for(town: Town) -> Draft:
@@ -120,13 +136,15 @@ def draft_for(town: Town) -> Draft:
     )
 
 
-def scenario_text(name: str, source: str, path: Path, draft: Draft, driving_side: Choice = "auto") -> str:
+def scenario_text(
+    name: str, source: str, path: Path, draft: Draft, driving_side: Choice = "auto", around: Around | None = None
+) -> str:
     """The text of the scenario's file, with comments."""
     return TEMPLATE.format(
-        title=f"A generated town, {source}." if source in KINDS else f"The roads of {Path(source).name}.",
+        title=_title(source, around),
         file=path,
         name=_scalar(name),
-        town=_town_line(source, path, driving_side),
+        town=_town_line(source, path, driving_side, around),
         rate_hz=draft.rate_hz,
         tour_m=draft.tour_m,
         tour_words=_tour_words(draft),
@@ -136,12 +154,20 @@ def scenario_text(name: str, source: str, path: Path, draft: Draft, driving_side
     )
 
 
-def _town_line(source: str, path: Path, driving_side: Choice) -> str:
+def _title(source: str, around: Around | None) -> str:
+    """The first comment of the file."""
+    if source in KINDS:
+        return f"A generated town, {source}."
+    within = f" within {around}" if around else ""
+    return f"The roads of {Path(source).name}{within}."
+
+
+def _town_line(source: str, path: Path, driving_side: Choice, around: Around | None) -> str:
     """The line of the file that says where to drive."""
     if source in KINDS:
         return f"town: {_flow(_shipped_town(source, driving_side))}"
-    if _is_imported(source):
-        return f"town: {{network: {_scalar(f'{path.stem}.net.xml.gz')}}}  # imported by netconvert; netedit opens it"
+    if around or _is_imported(source):
+        return f"town: {{network: {_scalar(f'{path.stem}.net.xml.gz')}}}  # made by netconvert; netedit opens it"
     return f"town: {{network: {_scalar(source if source.startswith(PACKAGE) else _relative(source, path))}}}"
 
 

@@ -91,7 +91,10 @@ def _stills(plans: dict[Role, RecordingPlan], town: Town, preview: Preview) -> t
     for role, plan in plans.items():
         samples, conditions = preview.samples[role], plan.drive_spec.conditions
         numbers = np.linspace(0, len(samples.frame_steps) - 1, 2 * STILLS + 1).astype(int)[1::2]  # not where a drive begins
-        with FrameRenderer(build_scene(town, plan.scenario.seed, conditions), plan.scenario.camera) as renderer:
+        views_m, camera = samples.poses_m[samples.frame_steps[numbers]], plan.scenario.camera
+        half_view_rad = float(np.radians(0.5 * camera.fov_deg + abs(camera.yaw_offset_deg)))
+        scene = build_scene(town, plan.scenario.seed, conditions, views_m, half_view_rad)  # of a large town only what they show
+        with FrameRenderer(scene, camera) as renderer:
             for number in numbers:
                 frames.append(draw_frame(renderer, preview.drives[role], samples, int(number), conditions, plan.seed)[0])
                 captions.append(f"{role}, {samples.t_s[samples.frame_steps[number]]:.0f} s")

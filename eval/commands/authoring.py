@@ -28,7 +28,8 @@ def add_scenario_command(commands: Any) -> None:
         A map that is not SUMO's is imported once: its network is written beside the scenario, as NAME.net.xml.gz. What is odd
         about the network is said with its place and what to do. Nothing that exists is overwritten.""",
         ["hippodrome scenario new my-town --from my_town.osm",
-         "hippodrome scenario new my-grid --from grid --out scenarios/my-grid.yaml"],
+         "hippodrome scenario new my-grid --from grid --out scenarios/my-grid.yaml",
+         "hippodrome scenario new my-district --from my_town.osm --around 49.6116,6.1319 --radius 800"],
     )  # fmt: skip
     new.add_argument("name", metavar="NAME", help="the scenario's name, under which its results are filed")
     new.add_argument(
@@ -41,6 +42,12 @@ def add_scenario_command(commands: Any) -> None:
         help="where traffic keeps in a generated town or a map that is imported (default: auto, as the map's roundabouts, tags, "
              "rules or place say, else right; what is found is told in a note)",
     )  # fmt: skip
+    new.add_argument(
+        "--around", metavar="LAT,LON",
+        help="cut a circle out of a large map, with this place in degrees as its middle (or xy:X,Y, in the metres of a SUMO "
+             "network), written beside the scenario (default: all of the map)",
+    )  # fmt: skip
+    new.add_argument("--radius", type=float, default=1000.0, metavar="METRES", help="of the circle of --around (default: 1000)")
     new.add_argument("--out", type=Path, metavar="FILE", help="file for the scenario (default: NAME.yaml)")
 
     validate = add_command(
@@ -83,9 +90,11 @@ def add_scenario_command(commands: Any) -> None:
 
 def _new(options: argparse.Namespace) -> int:
     from hippodrome.eval.authoring.draft import new_scenario
+    from hippodrome.sim.net_cut import parse_around
 
     path = options.out or Path(f"{options.name}.yaml")
-    draft = new_scenario(options.name, options.source, path, options.driving_side)
+    around = parse_around(options.around, options.radius) if options.around else None
+    draft = new_scenario(options.name, options.source, path, options.driving_side, around)
     for note in draft.notes:
         print(f"note: {note}")
     print(f"{path}: written; {draft.drivable_km:.2f} km to drive, mapping tour {draft.tour_m:.0f} m\n"

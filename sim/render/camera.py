@@ -32,22 +32,34 @@ class CameraSpec(Spec):
 
 
 def camera_position_m(spec: CameraSpec, body_pose_m: FloatArray, right_m: float = 0.0) -> tuple[FloatArray, float]:
-    """Optical centre (3,) and viewing direction [rad] for a body pose (3,); ``right_m`` shifts along the image's x axis."""
+    """Optical centre (3,) and viewing direction [rad] for a body pose (3,); ``right_m`` shifts along the image's x axis.
+
+    A pose (5,) has the height [m] and the pitch [rad, nose up] of the car too.
+    """
     heading = float(body_pose_m[2])
     yaw = heading + float(np.radians(spec.yaw_offset_deg))
     x = body_pose_m[0] + spec.forward_m * np.cos(heading) + right_m * np.sin(yaw)
     y = body_pose_m[1] + spec.forward_m * np.sin(heading) - right_m * np.cos(yaw)
-    return np.array([x, y, spec.height_m]), yaw
+    if len(body_pose_m) == 3:
+        return np.array([x, y, spec.height_m]), yaw
+    sin, cos = np.sin(body_pose_m[4]), np.cos(body_pose_m[4])
+    back_m = spec.forward_m * (1.0 - cos) + spec.height_m * sin  # seen from above, the camera of a pitched car stands back
+    z = body_pose_m[3] + spec.forward_m * sin + spec.height_m * cos
+    return np.array([x - back_m * np.cos(heading), y - back_m * np.sin(heading), z]), yaw
 
 
-def camera_to_world(position_m: FloatArray, yaw_rad: float) -> FloatArray:
-    """(4, 4) pose in OpenGL's convention: the camera's x to the right, y up, z backwards."""
+def camera_to_world(position_m: FloatArray, yaw_rad: float, pitch_rad: float = 0.0) -> FloatArray:
+    """(4, 4) pose in OpenGL's convention: the camera's x to the right, y up, z backwards; pitch lifts the view."""
     cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
     pose = np.eye(4)
     pose[:3, 0] = sin, -cos, 0.0
     pose[:3, 1] = 0.0, 0.0, 1.0
     pose[:3, 2] = -cos, -sin, 0.0
     pose[:3, 3] = position_m
+    if pitch_rad != 0.0:
+        up, back = pose[:3, 1].copy(), pose[:3, 2].copy()
+        pose[:3, 1] = np.cos(pitch_rad) * up + np.sin(pitch_rad) * back
+        pose[:3, 2] = np.cos(pitch_rad) * back - np.sin(pitch_rad) * up
     return pose
 
 

@@ -65,6 +65,7 @@ vec3 grained() {
     return clamp(base.rgb * (1.0 + base.a * grain), 0.0, 1.0);
 }
 """
+WIDEST_RAD = 0.49 * np.pi  # half the angle of a view that two planes can bound
 UNIFORMS = ("clip_from_world", "eye", "shift", "haze", "extinction")
 VERTEX_DTYPE = np.dtype([("position", "<f4", 3), ("colour", "u1", 4)])
 
@@ -159,7 +160,10 @@ class FlatRenderer(pyrender.renderer.Renderer):  # type: ignore[misc]  # pyrende
         """Visible tiles, and whether near enough for fine detail; nearest first, so that the depth test hides much early."""
         pose = scene.get_pose(scene.main_camera_node)
         camera = scene.main_camera_node.camera
-        seen, distance_m = visible_tiles(self._bounds_m, pose[:2, 3], -pose[:2, 2], camera.half_fov_rad, camera.zfar)
+        half_view_rad = camera.half_fov_rad
+        if pose[2, 2] != 0.0:  # the view is pitched: its upper or lower corners reach farther to the sides
+            half_view_rad = min(half_view_rad + abs(float(np.arcsin(pose[2, 2]))), WIDEST_RAD)
+        seen, distance_m = visible_tiles(self._bounds_m, pose[:2, 3], -pose[:2, 2], half_view_rad, camera.zfar)
         return [(self._tiles[i], d < self.fine_range_m) for i, d in zip(seen, distance_m, strict=True)]
 
     def _forward_pass(self, scene: Any, flags: int, seg_node_map: Any = None) -> Frame:

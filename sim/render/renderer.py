@@ -69,6 +69,8 @@ class FrameRenderer:
     ) -> Frame:
         """The frame (H, W, 3) seen from body pose (3,), with other vehicles at (k, 3), in the network frame.
 
+        Where roads climb, poses are (5,) and (k, 5): x, y, heading, height [m], pitch [rad, nose up].
+
         A vehicle keeps its colour as long as it keeps its identity; without ``vehicle_ids`` the row number is the identity.
         """
         self._place_vehicles(vehicle_poses_m, vehicle_kinds, vehicle_ids)
@@ -89,13 +91,15 @@ class FrameRenderer:
 
     def _place_vehicles(self, poses_m: FloatArray, kinds: UInt8Array, ids: IntArray | None) -> None:
         identity = np.arange(len(poses_m), dtype=np.int32) if ids is None else ids
-        local = np.asarray(poses_m, dtype=np.float64) - [*self.scene.origin_m, 0.0]
+        poses = np.asarray(poses_m, dtype=np.float64)
+        local = poses - np.concatenate([self.scene.origin_m, np.zeros(poses.shape[1] - 2)])
         self._moving.replace(vehicle_mesh(local, kinds, identity, self.scene.light))
 
     def _shoot(self, pose_m: FloatArray, right_m: float) -> Frame:
         position, yaw = camera_position_m(self.camera, np.asarray(pose_m, dtype=np.float64), right_m)
         position[:2] -= self.scene.origin_m
-        self._gl_scene.set_pose(self._camera_node, camera_to_world(position, yaw))
+        pitch = float(pose_m[4] * np.cos(np.radians(self.camera.yaw_offset_deg))) if len(pose_m) > 3 else 0.0
+        self._gl_scene.set_pose(self._camera_node, camera_to_world(position, yaw, pitch))
         pixels = self._offscreen.render(self._gl_scene)
         size = (self.camera.width, self.camera.height)
         reduced = pixels if self.camera.supersample == 1 else cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)

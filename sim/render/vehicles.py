@@ -36,7 +36,7 @@ BELT_SHARE: Final = (0.56, 0.50, 0.45)  # of the height, where the glass begins
 
 
 def vehicle_mesh(poses_m: FloatArray, kinds: UInt8Array, ids: IntArray, light: Light) -> Tile:
-    """All vehicles at centre poses (k, 3) as one tile."""
+    """All vehicles at centre poses (k, 3), or (k, 5) with height and pitch, as one tile."""
     if len(poses_m) == 0:
         return Tile(
             np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), np.zeros((0, 3), np.uint8), np.zeros(0, np.uint8), 0
@@ -53,12 +53,26 @@ def _of_kind(kind: int, poses_m: FloatArray, ids: IntArray) -> Mesh:
     paint = PAINTS[(ids.astype(np.int64) * 2654435761 >> 8) % len(PAINTS)]  # Knuth's multiplicative hash: neighbours differ
     albedo = np.where(painted[None, :, None], paint[:, None, :], template.albedo[None])
     return Mesh(
-        vertices_m=_flat(turned(template.vertices_m[None].astype(np.float64), poses_m[:, :2], poses_m[:, 2])),
-        normals=_flat(turned(template.normals[None].astype(np.float64), np.zeros((k, 2)), poses_m[:, 2])),
+        vertices_m=_flat(turned(_pitched(template.vertices_m, poses_m), _feet(poses_m), poses_m[:, 2])),
+        normals=_flat(turned(_pitched(template.normals, poses_m), np.zeros((k, 2)), poses_m[:, 2])),
         albedo=_flat(albedo),
         surface=np.tile(template.surface, k),
         faces=(np.arange(k)[:, None, None] * n + template.faces).reshape(-1, 3).astype(np.int32),
     )
+
+
+def _feet(poses_m: FloatArray) -> FloatArray:
+    return poses_m[:, :2] if poses_m.shape[1] == 3 else poses_m[:, [0, 1, 3]]
+
+
+def _pitched(local: Float32Array, poses_m: FloatArray) -> FloatArray:
+    """Points or directions (n, 3) of the template in the axes of each vehicle (1 or k, n, 3), nose up by its pitch."""
+    points = local[None].astype(np.float64)
+    if poses_m.shape[1] == 3:
+        return points
+    sin, cos = np.sin(poses_m[:, 4:5]), np.cos(poses_m[:, 4:5])
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    return np.stack(np.broadcast_arrays(cos * x - sin * z, y, sin * x + cos * z), axis=-1)
 
 
 def _flat(array: np.ndarray) -> Float32Array:

@@ -2,33 +2,64 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
 from hippodrome.core.types import FloatArray, IntArray
+from hippodrome.sim.scene.blocks import GROUND_M, blocks_seen, is_drawn_whole, town_near
 from hippodrome.sim.scene.conditions import Conditions
 from hippodrome.sim.scene.light import colour, extinction_per_m, grain, haze_rgb, light_of, sky_dome
 from hippodrome.sim.scene.mesh import Mesh, merge
-from hippodrome.sim.scene.town_mesh import town_mesh
+from hippodrome.sim.scene.town_mesh import block_mesh, land_of, town_mesh
 from hippodrome.sim.scene.types import Scene, Tile
 from hippodrome.sim.types import Town
 
 TILE_M: Final = 80.0  # small enough to cull well, large enough that a frame needs few draw calls
 
 
-def build_scene(town: Town, seed: int, conditions: Conditions) -> Scene:
-    """The same town and seed give the same geometry under all conditions, and the same bytes under the same ones."""
+def build_scene(
+    town: Town, seed: int, conditions: Conditions, drive_m: FloatArray | None = None, half_view_rad: float | None = None
+) -> Scene:
+    """The same town and seed give the same geometry under all conditions, and the same bytes under the same ones.
+
+    Args:
+        town: What to draw.
+        seed: Of everything beside the roads.
+        conditions: Season, light and weather.
+        drive_m: Poses (n, 2 or more columns) from which a town of more than ``WHOLE_KM`` is seen: what none of them can see
+            is left out. Without them, or of a smaller town, everything is drawn.
+        half_view_rad: Half the angle that is seen around each pose's heading, for poses (n, 3) that are few; None: the drive
+            looks everywhere.
+    """
     origin_m = np.round(0.5 * (town.network.points_m.min(axis=0) + town.network.points_m.max(axis=0)))
     light = light_of(conditions)
+    if drive_m is None or is_drawn_whole(town):
+        tiles = _tiles(*town_mesh(town, seed, origin_m), conditions)
+    else:
+        tiles = tuple(_seen_tiles(town, seed, origin_m, conditions, drive_m, half_view_rad))
     return Scene(
-        tiles=_tiles(*town_mesh(town, seed, origin_m), conditions),
+        tiles=tiles,
         sky=sky_dome(conditions),
         origin_m=origin_m,
         haze_rgb=haze_rgb(conditions),
         extinction_per_m=extinction_per_m(conditions),
         light=light,
     )
+
+
+def _seen_tiles(
+    town: Town, seed: int, origin_m: FloatArray, conditions: Conditions, drive_m: FloatArray, half_view_rad: float | None
+) -> Iterator[Tile]:
+    """The tiles of the blocks within sight of a drive, block by block."""
+    view = None if half_view_rad is None or half_view_rad >= 0.5 * np.pi else (drive_m[:, 2], half_view_rad)
+    blocks = blocks_seen(drive_m[:, :2] - origin_m, view)
+    land = land_of(town_near(town, origin_m, blocks, GROUND_M), origin_m)
+    for block in blocks:
+        bold, fine = block_mesh(land, seed, origin_m, block)
+        if len(bold.faces):
+            yield from _tiles(bold, fine, conditions)
 
 
 def _tiles(bold: Mesh, fine: Mesh, conditions: Conditions) -> tuple[Tile, ...]:

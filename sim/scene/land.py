@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -10,7 +11,7 @@ from scipy.spatial import KDTree
 
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.scene.mesh import Mesh, Surface, boxes, merge, placed, polygons, turned
-from hippodrome.sim.scene.placement import Border, Shapes, clear_of, quilt, rectangles, spread
+from hippodrome.sim.scene.placement import Bools, Border, Shapes, clear_of, quilt, rectangles, spread
 
 CELL_M: Final = 80.0  # as the tiles, so that no cell straddles two
 FINE_CELLS: Final = 8  # per side of a cell near the road
@@ -31,11 +32,12 @@ ROW_M: Final = 2.4  # between rows
 WOOD: Final = np.array([0.46, 0.38, 0.29])
 
 
-def ground_mesh(road_points_m: FloatArray, rng: np.random.Generator) -> Mesh:
-    """Grass around all roads (n, 2), coarse where far away."""
+def ground_mesh(road_points_m: FloatArray, rng: np.random.Generator, holds: Callable[[FloatArray], Bools]) -> Mesh:
+    """Grass around all roads (n, 2), coarse where far away; the cells whose middles (k, 2) are held."""
     low = np.floor((road_points_m.min(axis=0) - REACH_M) / CELL_M)
     high = np.ceil((road_points_m.max(axis=0) + REACH_M) / CELL_M)
     grid = np.stack(np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1])), axis=-1).reshape(-1, 2) * CELL_M
+    grid = grid[holds(grid + 0.5 * CELL_M)]
     distance = KDTree(road_points_m).query(grid + 0.5 * CELL_M)[0] - 0.7 * CELL_M  # less the cell's half diagonal
     fine, coarse = grid[distance < NEAR_M], grid[(distance >= NEAR_M) & (distance < REACH_M)]
     step = CELL_M / FINE_CELLS

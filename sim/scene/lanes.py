@@ -14,6 +14,7 @@ from hippodrome.core.types import FloatArray, IntArray, UInt8Array
 
 PIECE_M: Final = 3.0  # the length of a painted dash
 PROBE_M: Final = 0.5  # how far beyond a lane's border one looks for another lane
+LEVEL_M: Final = 2.0  # of height between them, beyond which one lane passes above another and does not lie beside it
 
 
 class Beside(IntEnum):
@@ -36,9 +37,15 @@ class Pieces:
     end_normal: FloatArray  # (P, 2)
     along_m: FloatArray  # (P,) arc length of the middle
     half_width_m: FloatArray  # (P,)
+    start_z_m: FloatArray  # (P,)
+    end_z_m: FloatArray  # (P,)
 
     def select(self, rows: np.ndarray) -> Pieces:
         return Pieces(*(getattr(self, name)[rows] for name in self.__slots__))
+
+    def middle_z_m(self) -> FloatArray:
+        """Height (P,) halfway along."""
+        return 0.5 * (self.start_z_m + self.end_z_m)
 
     def middle_m(self) -> FloatArray:
         return 0.5 * (self.start_m + self.end_m)
@@ -51,8 +58,8 @@ class Pieces:
         return unit
 
 
-def cut_lanes(network: RoadNetwork, origin_m: FloatArray) -> Pieces:
-    """All lanes, internal ones included, in pieces of at most ``PIECE_M``, relative to the origin."""
+def cut_lanes(network: RoadNetwork, origin_m: FloatArray, heights_m: FloatArray | None = None) -> Pieces:
+    """All lanes in pieces of at most ``PIECE_M``, relative to the origin; ``heights_m`` (P,) of the network's points."""
     counts = np.diff(network.point_start)
     owner = np.repeat(np.arange(network.lane_count, dtype=np.int32), counts)
     points = network.points_m - origin_m
@@ -65,6 +72,7 @@ def cut_lanes(network: RoadNetwork, origin_m: FloatArray) -> Pieces:
     count = np.repeat(share, share)
     low, high = (step / count)[:, None], ((step + 1) / count)[:, None]
     arc = _arc_lengths(points, owner)
+    z = np.zeros(len(points)) if heights_m is None else heights_m
     return Pieces(
         lane=owner[row].astype(np.int32),
         start_m=(1 - low) * points[row] + low * points[row + 1],
@@ -73,6 +81,8 @@ def cut_lanes(network: RoadNetwork, origin_m: FloatArray) -> Pieces:
         end_normal=(1 - high) * normal[row] + high * normal[row + 1],
         along_m=arc[row] + (step + 0.5) / count * np.repeat(length, share),
         half_width_m=0.5 * network.width_m[owner[row]],
+        start_z_m=(1 - low[:, 0]) * z[row] + low[:, 0] * z[row + 1],
+        end_z_m=(1 - high[:, 0]) * z[row] + high[:, 0] * z[row + 1],
     )
 
 
@@ -113,6 +123,7 @@ def beside(pieces: Pieces, is_internal: np.ndarray, side: int, probe_m: float = 
     along = np.abs(offset[..., 0] * normal[other][..., 1] - offset[..., 1] * normal[other][..., 0])
     half_length = 0.5 * np.linalg.norm(pieces.end_m - pieces.start_m, axis=1)
     covers = found & (pieces.lane[other] != pieces.lane[:, None])
+    covers &= np.abs(pieces.middle_z_m()[other] - pieces.middle_z_m()[:, None]) < LEVEL_M
     covers &= (across <= pieces.half_width_m[other] + 0.1) & (along <= half_length[other] + 0.3)
     hit = np.argmax(covers, axis=1)
     row = other[np.arange(len(probe)), hit]

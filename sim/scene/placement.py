@@ -60,7 +60,19 @@ def paved_area(town: Town, origin_m: FloatArray) -> tuple[Shapes, Shapes]:
     lanes = shapely.buffer(centrelines, 0.5 * network.width_m, cap_style="flat", join_style="mitre", mitre_limit=2.0)
     outlines = np.array([shapely.Polygon(outline - origin_m) for outline in town.junction_polygons_m], dtype=object)
     junctions: Shapes = shapely.make_valid(outlines)
-    return np.concatenate([lanes, junctions]), junctions
+    return np.concatenate([lanes, junctions, turning_places(town, origin_m)]), junctions
+
+
+def turning_places(town: Town, origin_m: FloatArray) -> Shapes:
+    """Polygons of the paving at dead ends."""
+    return np.array([shapely.Polygon(outline - origin_m) for outline in town.turning_places_m], dtype=object)
+
+
+def other_lanes(town: Town, origin_m: FloatArray) -> Shapes:
+    """Polygons of the lanes that are closed to cars: nothing stands on them either."""
+    outlines = np.array([shapely.Polygon(outline - origin_m) for outline in town.other_lanes_m], dtype=object)
+    shapes: Shapes = shapely.make_valid(outlines)
+    return shapes
 
 
 def rectangles(centre_m: FloatArray, yaw_rad: FloatArray, length_m: FloatArray, width_m: FloatArray) -> Shapes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -12,7 +13,8 @@ from scipy.spatial import KDTree
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.scene.lanes import PIECE_M, PROBE_M, Beside, Pieces, beside, cut_lanes
 from hippodrome.sim.scene.mesh import Mesh, Surface, merge, placed, polygons
-from hippodrome.sim.scene.placement import Bools, Shapes, clear_of, paved_area
+from hippodrome.sim.scene.placement import Bools, Shapes, clear_of, paved_area, turning_places
+from hippodrome.sim.scene.relief import Relief, rim_mesh, stands_low, underside_mesh
 from hippodrome.sim.types import Town
 
 JUNCTION_Z_M: Final = 0.025  # layers lie far enough apart for the depth buffer, and too close to be seen
@@ -35,11 +37,18 @@ PAVING: Final = np.array([0.62, 0.60, 0.57])
 
 
 def road_mesh(
-    town: Town, origin_m: FloatArray, town_share: Callable[[FloatArray], FloatArray], rng: np.random.Generator
+    town: Town,
+    origin_m: FloatArray,
+    town_share: Callable[[FloatArray], FloatArray],
+    rng: np.random.Generator,
+    relief: Relief | None = None,
 ) -> tuple[Mesh, Mesh]:
-    """Bold and fine parts of the roads; ``town_share`` gives at (k, 2) how much of a town it is there: kerbs or gravel."""
+    """Bold and fine parts of the roads; ``town_share`` gives at (k, 2) how much of a town it is there: kerbs or gravel.
+
+    ``relief`` is the ground below, from which roads are told from bridges; None: it is flat.
+    """
     network = town.network
-    pieces = cut_lanes(network, origin_m)
+    pieces = cut_lanes(network, origin_m, town.heights_m)
     tone = np.where(network.is_internal, 1.0, rng.uniform(0.88, 1.1, len(network.edge_ids))[network.lane_edge])[pieces.lane]
     patch = rng.uniform(0.97, 1.03, len(pieces.lane))
     bold = [
@@ -48,17 +57,24 @@ def road_mesh(
     ]
     fine = []
     roads, junctions = paved_area(town, origin_m)
+    turned_at = turning_places(town, origin_m)
     open_road = ~network.is_internal[pieces.lane]
     for side in (1, -1):
         kind, other = beside(pieces, network.is_internal, side)
         turn = beside(pieces, network.is_internal, side, probe_m=0.05)[0] == Beside.NOTHING  # not between two lanes that part
         edge = pieces.select((kind == Beside.NOTHING) & (open_road | (turn & ~_leads_into(pieces, side, junctions))))
+        edge = edge.select(~_leads_into(edge, side, turned_at))
         paved = (town_share(edge.middle_m()) > PAVED_SHARE) & _has_room(edge, side, roads)
-        bold += [_verge(edge.select(~paved), side), _pavement(edge.select(paved), side)]
+        low = stands_low(edge, relief)
+        bold += [_verge(edge.select(~paved & low), side), _pavement(edge.select(paved & low), side)]
+        if relief is not None:
+            bold.append(rim_mesh(edge, side, relief))
         fine.append(_line(edge, side, inset_m=0.2))
         between = np.isin(kind, (Beside.OPPOSITE, Beside.SAME_DIRECTION)) & open_road & (pieces.lane < other)
         dashed = between & (pieces.along_m % DASH_PERIOD_M < PIECE_M)
         fine.append(_line(pieces.select(dashed), side, inset_m=0.0))
+    if relief is not None:
+        bold.append(underside_mesh(pieces, relief))
     return merge(bold), merge([_repairs(pieces.select(open_road), rng), *fine, _stop_lines(town, origin_m)])
 
 
@@ -94,7 +110,8 @@ def strip(
         pieces.start_m + left_m[:, None] * pieces.start_normal,
     ]
     flat = np.stack(corners, axis=1)
-    height = np.broadcast_to(z_m, flat.shape[:2])[..., None]
+    road_z = np.stack([pieces.start_z_m, pieces.end_z_m, pieces.end_z_m, pieces.start_z_m], axis=1)
+    height = (np.broadcast_to(z_m, flat.shape[:2]) + road_z)[..., None]
     return polygons(np.concatenate([flat, height], axis=2), albedo, surface)
 
 
@@ -153,15 +170,33 @@ def _stop_lines(town: Town, origin_m: FloatArray) -> Mesh:
     x, y = np.broadcast_to([-0.9, -0.5, -0.5, -0.9], (len(half), 4)), half[:, None] * np.array([-1, -1, 1, 1])
     return placed(
         np.stack([x, y, np.full_like(y, PAINT_Z_M)], axis=-1)[:, None],
-        end[rows] - origin_m,
+        end[rows] - origin_m if town.heights_m is None else np.column_stack([end - origin_m, town.heights_m[last]])[rows],
         heading,
         np.tile(PAINT, (len(half), 1)),
     )
 
 
 def _junctions(town: Town, origin_m: FloatArray) -> Mesh:
-    """The junctions' outlines, triangulated."""
-    outlines = [shapely.Polygon(outline - origin_m) for outline in town.junction_polygons_m]
+    """The junctions' outlines, triangulated; where roads climb, each corner at the height of the nearest one of its outline."""
+    turned_at = _outlines(town.turning_places_m, origin_m)
+    if town.junction_heights_m is None or town.heights_m is None:
+        return merge([_outlines(town.junction_polygons_m, origin_m), turned_at])
+    nearest = KDTree(town.network.points_m - origin_m).query(turned_at.vertices_m[:, :2])[1]
+    parts = [_raised(turned_at, town.heights_m[nearest])]
+    for outline_m, heights_m in zip(town.junction_polygons_m, town.junction_heights_m, strict=True):
+        mesh = _outlines((outline_m,), origin_m)
+        nearest = KDTree(outline_m - origin_m).query(mesh.vertices_m[:, :2])[1]
+        parts.append(_raised(mesh, heights_m[nearest]))
+    return merge(parts)
+
+
+def _raised(mesh: Mesh, by_m: FloatArray) -> Mesh:
+    up = np.column_stack([np.zeros((len(by_m), 2)), by_m]).astype(np.float32)
+    return replace(mesh, vertices_m=mesh.vertices_m + up)
+
+
+def _outlines(outlines_m: tuple[FloatArray, ...], origin_m: FloatArray) -> Mesh:
+    outlines = [shapely.Polygon(outline - origin_m) for outline in outlines_m]
     valid = shapely.make_valid(np.array(outlines, dtype=object))
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(valid))
     if len(parts) == 0:

@@ -226,14 +226,14 @@ def _prism(x0: FloatArray, half_width: FloatArray, height: FloatArray) -> FloatA
     return np.stack([np.stack(face, axis=1) for face in (right, left, top, front, back)], axis=1)
 
 
-def treeline_mesh(border: Border, roads: Shapes, rng: np.random.Generator) -> Mesh:
-    """Ragged walls of wood far behind the road: the horizon is rarely bare."""
+def treeline_mesh(border: Border, roads: Shapes, rng: np.random.Generator, outside: Shapes) -> Mesh:
+    """Ragged walls of wood far behind the road and clear of what lies outside: the horizon is rarely bare."""
     site = border.draw(45.0, rng)
     k, segments = len(site.length_m), 10
     centre = site.point_m + site.outward * rng.uniform(75.0, 190.0, k)[:, None]
     yaw, length = rng.uniform(0.0, np.pi, k), rng.uniform(30.0, 80.0, k)
     shapes = rectangles(centre, yaw, length, np.full(k, 8.0))
-    free = np.flatnonzero(clear_of(shapes, roads, 55.0))
+    free = np.flatnonzero(clear_of(shapes, roads, 55.0) & clear_of(shapes, outside, 2.0))
     free = free[spread(shapes[free], 12.0)]
     x = (np.linspace(-0.5, 0.5, segments + 1) * length[free, None])[..., None]
     bend = 6.0 * rng.uniform(-1.0, 1.0, (len(free), 1)) * np.cos(np.linspace(-1.5, 1.5, segments + 1))

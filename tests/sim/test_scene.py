@@ -51,7 +51,7 @@ def crossing(name="rural", left_hand=False):
     square = np.array([[b, -b], [b, b], [-b, b], [-b, -b]])
     signals = np.array([[-8.0, -1.6, 0.0], [1.6, -8.0, np.pi / 2]])
     roads = network(*arms, *inner, internal=range(8, 12))
-    return Town(name, Path("crossing.net.xml"), roads, (square,), signals, left_hand, ())
+    return Town(name, Path("crossing.net.xml"), roads, (square,), signals, left_hand, (), rural=name == "rural")
 
 
 @pytest.fixture(scope="module")
@@ -257,7 +257,7 @@ def test_a_town_far_from_its_networks_zero_looks_the_same():
     shift = np.array([512_000.0, 5_400_000.0])
     moved = network(*(near.network.lane_points_m(i) + shift for i in range(near.network.lane_count)), internal=range(8, 12))
     signals = near.signals_m + np.array([*shift, 0.0])
-    far = Town("rural", near.net_file, moved, (near.junction_polygons_m[0] + shift,), signals, False, ())
+    far = Town("rural", near.net_file, moved, (near.junction_polygons_m[0] + shift,), signals, False, (), rural=True)
     one, two = build_scene(near, 0, Conditions()), build_scene(far, 0, Conditions())
     assert np.allclose(two.origin_m - one.origin_m, shift)
     assert len(one.tiles) == len(two.tiles)

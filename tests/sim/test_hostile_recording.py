@@ -23,7 +23,7 @@ from hippodrome.sim.recording import (
     write_arrays,
     write_chunk,
 )
-from hippodrome.sim.recording_checks import MAX_FRAME_BYTES, decoded_png
+from hippodrome.sim.recording_checks import CHECKSUM, MAX_FRAME_BYTES, decoded_png, with_checksum
 
 STEPS = 20
 
@@ -52,8 +52,21 @@ def resealed(folder):
     """The recording with right hashes of whatever is in its files: somebody made it so on purpose."""
     manifest = json.loads((folder / MANIFEST).read_text())
     manifest["sha256"] = {name: sha256_of(folder / name) for name in manifest["sha256"]}
-    (folder / MANIFEST).write_text(json.dumps(manifest))
+    (folder / MANIFEST).write_text(json.dumps(with_checksum({key: manifest[key] for key in manifest if key != CHECKSUM})))
     return open_recording(folder)
+
+
+@pytest.mark.parametrize("change", [{"scenario": "tess"}, {"new": 1}, {CHECKSUM: "0" * 64}, {CHECKSUM: None}])
+def test_a_manifest_that_was_changed_is_refused(recording, change):
+    path = recording / MANIFEST
+    manifest = json.loads(path.read_text())
+    path.write_text(json.dumps({**manifest, **change}))
+    with pytest.raises(RecordingError, match="manifest_sha256 does not hold"):
+        open_recording(recording)
+    path.write_text(json.dumps(manifest, indent=7))
+    assert open_recording(recording).manifest == manifest
+    path.write_text(json.dumps({key: manifest[key] for key in manifest if key != CHECKSUM}))  # as before there was one
+    open_recording(recording)
 
 
 def with_value(name, value, row=3):

@@ -20,6 +20,7 @@ from hippodrome.core.types import CognitiveMap, HippodromeError, MatchBreak, Mat
 from hippodrome.eval.exchange.drives.exported import truth_of
 from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.eval.methods.stages import map_files, network_file, read_roads, refine_files
+from hippodrome.eval.real.kept import read_breaks, read_record
 from hippodrome.eval.real.page import Drive, drive_page
 from hippodrome.proto.codec import load_map
 from hippodrome.sim.geo_start import GeoStart
@@ -115,7 +116,7 @@ def run_drive(options: RunOptions) -> None:
     stages.run("score", None, lambda: _score(options, topometric, recording))
     stages.run("page", None, lambda: _write_page(options, recording, net_file, stages))
     cognitive_map = load_map(topometric)[0]
-    print(_verdict(cognitive_map, _read_breaks(out)))
+    print(_verdict(cognitive_map, read_breaks(out / REFINEMENT)))
     print(f"open {out / PAGE}")
 
 
@@ -135,15 +136,7 @@ def _check_same(out: Path, asked: Mapping[str, str]) -> None:
 
 def _record_of(out: Path) -> dict[str, Any]:
     path = out / RECORD
-    if not path.exists():
-        return {}
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(record, dict):
-            return record
-    except (OSError, ValueError, RecursionError) as error:
-        raise HippodromeError(f"{path}: cannot be read ({error}); choose a new --out") from None
-    raise HippodromeError(f"{path}: not the record of a run; choose a new --out")
+    return read_record(path) if path.exists() else {}
 
 
 def _content(path: Path) -> str:
@@ -178,12 +171,6 @@ def _refine(options: RunOptions, net_file: Path, topometric: Path) -> None:
     write_atomically(options.out / REFINEMENT, (json.dumps(content, indent=1) + "\n").encode())
 
 
-def _read_breaks(out: Path) -> tuple[MatchBreak, ...]:
-    content = json.loads((out / REFINEMENT).read_text(encoding="utf-8"))
-    found = ((one["first"], one["last"], MatchStatus[one["status"]], one["cause"]) for one in content["breaks"])
-    return tuple(MatchBreak(first, last, status, cause) for first, last, status, cause in found)
-
-
 def _score(options: RunOptions, topometric: Path, recording: Path) -> None:
     """The scores, where there is a truth; a map that cannot be scored is none that cannot be used."""
     try:
@@ -202,7 +189,7 @@ def _write_page(options: RunOptions, recording: Path, net_file: Path, stages: _S
         recording=open_recording(recording, verify=False),
         cognitive_map=load_map(options.out / TOPOMETRIC)[0],
         roads=_silently(lambda: read_roads(net_file, options.out)),
-        breaks=_read_breaks(options.out),
+        breaks=read_breaks(options.out / REFINEMENT),
         scores=tuple(stages.said("score")),
         notes=tuple(line for name in ("roads", "import", "refine") if name in stages.done for line in stages.said(name)),
         stages={name: one["seconds"] for name, one in stages.done.items()},

@@ -42,7 +42,7 @@ def check_samples(arrays: Mapping[str, np.ndarray[Any, Any]], most_steps: int) -
             raise ValueError(f"{name} is {array.dtype} {array.shape}, a recording of {count} steps has {shape}")
     for name, most in MOST.items():
         unknown = np.isnan(arrays[name]) if name in TRUTH else False
-        _require((np.abs(arrays[name]) <= most) | unknown, name, f"not finite, or beyond {most:g}")
+        _require((np.abs(arrays[name].astype(np.float64)) <= most) | unknown, name, f"not finite, or beyond {most:g}")
     _require(arrays["dt_s"] > 0.0, "dt_s", "not above zero")
     _require(np.diff(arrays["t_s"]) > 0.0, "t_s", "followed by an earlier or the same one")
     lanes = len(arrays["lane_ids"])

@@ -42,7 +42,8 @@ class _Refinement(BaseModel):
 
 def read_record(path: Path) -> dict[str, Any]:
     """What was asked of an earlier run, and the stages that it finished. Raises HippodromeError."""
-    return _read(path, TypeAdapter(_Record), "not the record of a run; choose a new --out").model_dump(exclude_unset=True)
+    record: _Record = _read(path, TypeAdapter(_Record), "not the record of a run; choose a new --out")
+    return record.model_dump(exclude_unset=True)
 
 
 def read_breaks(path: Path) -> tuple[MatchBreak, ...]:

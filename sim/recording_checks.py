@@ -52,6 +52,19 @@ def check_samples(arrays: Mapping[str, np.ndarray[Any, Any]], most_steps: int) -
         raise ValueError("frame does not count the frames from 0 up")
 
 
+def check_truth(arrays: Mapping[str, np.ndarray[Any, Any]]) -> None:
+    """Raise ValueError, with the array and the row, unless the arrays of a truth with times of its own make one."""
+    shapes = {"t_s": (arrays["t_s"].size,), "has_heading": (1,), "poses_m": (arrays["t_s"].size, 3)}
+    for name, array in arrays.items():
+        shape = shapes.get(name, shapes["t_s"])
+        if array.shape != shape or array.dtype.kind != ("b" if name == "has_heading" else "f"):
+            raise ValueError(f"{name} is {array.dtype} {array.shape}, a truth of {arrays['t_s'].size} poses has {shape}")
+    for name, most in (("t_s", MOST["t_s"]), ("poses_m", MOST["poses_m"]), ("height_m", MOST["poses_m"])):
+        _require(np.abs(arrays[name].astype(np.float64)) <= most, name, f"not finite, or beyond {most:g}")
+    _require(~(arrays["sigma_m"] < 0.0), "sigma_m", "below zero")  # nan where it is unknown
+    _require(np.diff(arrays["t_s"]) > 0.0, "t_s", "followed by an earlier or the same one")
+
+
 def with_checksum(manifest: Mapping[str, Any]) -> dict[str, Any]:
     """The manifest with a checksum of its own, over all else in it, however it is laid out as text."""
     return {**manifest, CHECKSUM: _checksum(manifest)}

@@ -156,7 +156,10 @@ class Chaos:
         faults = [] if status in (0, *ENDS[attempt.target]) else [f"ended: status {status}: {said[-300:]}"]
         if status is None:
             faults = ["hang: the command that was hit"]
-        if "Traceback" in said or (status not in (0, 1) and len(said.strip().splitlines()) > 1):
+        lines = [
+            line for line in said.strip().splitlines() if "resource_tracker" not in line
+        ]  # Python cleans up after a killed main
+        if "Traceback" in said or (status not in (0, 1) and len(lines) > 1):
             faults.append(f"traceback: {said[-400:]}")
         end_s = time.monotonic() + ORPHAN_S
         while (left := session(process.pid)) and time.monotonic() < end_s:

@@ -125,8 +125,8 @@ def test_truth_may_be_unknown(recording):
     ({}, None),
 ])  # fmt: skip
 def test_a_truth_with_times_of_its_own(changed, reason):
-    whole = {"t_s": np.array([1.0, 2.0]), "poses_m": np.zeros((2, 3)), "height_m": np.zeros(2), "sigma_m": np.array([np.nan, 1.0]),
-             "has_heading": np.array([True])}  # fmt: skip
+    whole = {"t_s": np.array([1.0, 2.0]), "poses_m": np.zeros((2, 3)), "height_m": np.zeros(2),
+             "sigma_m": np.array([np.nan, 1.0]), "has_heading": np.array([True])}  # fmt: skip
     if reason is None:
         check_truth(whole)
         return

@@ -3,10 +3,15 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 WORKERS ?= 2
+SEED ?= 0
+SECONDS ?= 3600
+CASES ?= 3000
+KILLS ?= 20
+PAIRS ?= 4
 GATED := scenarios/gate/*.yaml --baseline scenarios/baseline.json
 
 .DEFAULT_GOAL := help
-.PHONY: help setup eval gate previews paper baselines test lint bench docs site cover clean
+.PHONY: help setup eval gate previews paper baselines test fuzz chaos lint bench docs site cover clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-9s %s\n", $$1, $$2}'
@@ -43,6 +48,12 @@ baselines: setup  ## the paper's drive with its rivals, binocular ORB-SLAM3 amon
 
 test: setup  ## the whole test suite, on real SUMO and real GL
 	@$(BIN)/python -m pytest tests
+
+fuzz: setup  ## break the inputs of all readers: CASES of them with SEED, for at most SECONDS
+	@$(BIN)/python -m tests.broken --cases $(CASES) --seed $(SEED) --seconds $(SECONDS)
+
+chaos: setup  ## kill KILLS commands, and run PAIRS in one folder; the reruns must give the same results
+	@$(BIN)/python -m tests.chaos --kills $(KILLS) --pairs $(PAIRS) --seed $(SEED) --seconds $(SECONDS)
 
 lint: setup  ## ruff and strict mypy
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy

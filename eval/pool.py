@@ -8,13 +8,14 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, wait
+from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn, TypeVar
+from typing import Final, NoReturn, TypeVar
 
 import cv2
 from rich.console import Console
@@ -27,6 +28,10 @@ from hippodrome.core.types import HippodromeError
 # the processes are gone first.
 SETTLE_S = 0.2
 INTERRUPTED = 130  # exit status by which a shell knows a process that was interrupted
+# Signals by which a process ends that has stumbled over its own work: a library gives up, or touches memory that is not there.
+CRASHES: Final = frozenset(
+    int(getattr(signal, name)) for name in ("SIGABRT", "SIGSEGV", "SIGBUS", "SIGILL", "SIGFPE") if hasattr(signal, name)
+)
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
 
@@ -62,6 +67,7 @@ class Workers:
         tasks: Sequence[TaskT],
         weight: Callable[[TaskT], int] = lambda _: 1,
         follow: Callable[[ResultT], TaskT | None] = lambda _: None,
+        place: Callable[[TaskT], str] = lambda _: "",
     ) -> list[ResultT]:
         """Run ``task`` on each of ``tasks``. The first error stops the stage; what is on disk by then stays there.
 
@@ -71,6 +77,7 @@ class Workers:
             tasks: The tasks.
             weight: How much a task counts in the progress display.
             follow: May answer a result with one more task, which is begun as soon as a process is free.
+            place: What a task works on, for the error if its process dies over it: the file that SUMO crashes on, for one.
 
         Returns:
             The results in the order of the tasks, those of the tasks that followed at the end.
@@ -79,9 +86,11 @@ class Workers:
             HippodromeError: A process died, or what a task raised.
         """
         bar = self.progress.add_task(stage, total=sum(weight(item) for item in tasks))
+        items = {self.executor.submit(perform, task, item): item for item in tasks}
+        futures = {future: weight(item) for future, item in items.items()}
         lines = ProgressLines(stage, self.progress.disable)
-        futures = {self.executor.submit(perform, task, item): weight(item) for item in tasks}
-        pending = set(futures)
+        pending, begun = set(futures), set[Future[ResultT]]()
+        processes = list((getattr(self.executor, "_processes", None) or {}).values())  # no public way tells how one ended
         try:
             while pending:
                 # Waiting for a short time at once, so that an interrupt from the keyboard takes effect without delay.
@@ -90,18 +99,35 @@ class Workers:
                     self.progress.advance(bar, futures[future])
                     if (item := follow(future.result())) is not None:
                         another = self.executor.submit(perform, task, item)
-                        futures[another] = weight(item)
+                        items[another], futures[another] = item, weight(item)
                         pending.add(another)
+                begun = {future for future in pending if future.running()} or begun
                 self.progress.update(bar, total=sum(futures.values()))
                 lines.say(sum(future.done() for future in futures), len(futures))
             return [future.result() for future in futures]
         except BrokenProcessPool:
-            raise HippodromeError(
-                f"{stage}: a worker process died (out of memory?); run the same command again to resume, with fewer --workers"
-            ) from None
+            places = sorted({place(items[future]) for future in begun or futures if not _ended_well(future)} - {""})
+            raise HippodromeError(f"{stage}: {_how_it_died(processes, places)}") from None
         finally:
             for future in futures:
                 future.cancel()
+
+
+def _ended_well(future: Future[ResultT]) -> bool:
+    return future.done() and not future.cancelled() and future.exception() is None
+
+
+def _how_it_died(processes: Sequence[BaseProcess], places: Sequence[str]) -> str:
+    """How the first of a broken pool's processes ended, at what, and what to do; the pool itself ends the others."""
+    end_s = time.monotonic() + SETTLE_S
+    while any(process.exitcode is None for process in processes) and time.monotonic() < end_s:
+        time.sleep(0.01)
+    signals = {-process.exitcode for process in processes if process.exitcode is not None}
+    at = f" over {' or '.join(places[:3])}{' or others' if len(places) > 3 else ''}" if places else ""
+    if crashes := sorted(signals & CRASHES):
+        cure = "SUMO or another library cannot take it: mend it or leave it out; the same command resumes"
+        return f"a worker process crashed ({signal.Signals(crashes[0]).name}){at}; {cure}"
+    return f"a worker process died{at} (out of memory?); run the same command again to resume, with fewer --workers"
 
 
 @contextmanager

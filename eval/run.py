@@ -96,10 +96,16 @@ def load_scenarios(
 
 def make_recordings(plans: Sequence[RecordingPlan], pool: Workers) -> None:
     """Simulate and draw the drives that are not on disk yet."""
-    chunks = pool.run("simulate", prepare, plans)
+    chunks = pool.run("simulate", prepare, plans, place=driven_place)
     pool.run("render", _render_chunk, [(plan, chunk) for plan, missing in zip(plans, chunks, strict=True) for chunk in missing],
              weight=lambda _: CHUNK_FRAMES)  # fmt: skip
     pool.run("seal", _finish, plans)
+
+
+def driven_place(plan: RecordingPlan) -> str:
+    """What a drive is simulated on, in words."""
+    network = plan.scenario.town.network
+    return f"{network} ({plan.scenario.name})" if network is not None else f"the generated town of {plan.scenario.name}"
 
 
 def _render_chunk(task: tuple[RecordingPlan, int]) -> int:

@@ -17,6 +17,10 @@ from hippodrome.sim.xml_head import one_line, opened, root_of
 SumoNet: TypeAlias = Any  # sumolib.net.Net: sumolib has no types
 SumoLane: TypeAlias = Any
 
+MISSING: Final[dict[type[Exception], str]] = {  # what sumolib stumbles over, in words
+    KeyError: "{} is named and not described",
+    IndexError: "a lane is named that its edge does not have",
+}
 SUMO_TRUE: Final = {"true", "1", "yes", "on", "x", "t"}  # what SUMO reads as true, in any case of letters
 MAX_NET_BYTES: Final = 1 << 30  # unpacked; a network of 1,000 km has some 200 MB
 FARTHEST_M: Final = 1e8  # from the origin: more than any place on Earth is in any projection
@@ -38,7 +42,7 @@ def load_net(net_file: Path) -> SumoNet:
     except (SAXException, OSError, EOFError, zlib.error) as error:
         raise HippodromeError(f"{net_file}: broken network ({one_line(error)}); write it again with netconvert") from error
     except (KeyError, AttributeError, ValueError, TypeError, IndexError, OverflowError) as error:
-        reason = f"{type(error).__name__} {one_line(error)}"
+        reason = MISSING.get(type(error), "{}").format(one_line(error))
         raise HippodromeError(f"{net_file}: not a consistent SUMO network ({reason}); write it again with netconvert") from error
     for fault in _faults(net):
         raise HippodromeError(f"{net_file}: not a consistent SUMO network ({fault}); mend it in netedit, or write it again")

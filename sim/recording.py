@@ -22,7 +22,7 @@ import numpy as np
 from hippodrome._files import read_bounded, replacing, sha256_of
 from hippodrome.core.types import Frame, HippodromeError, Observation, Step, Trajectory
 from hippodrome.sim.episode import Samples
-from hippodrome.sim.recording_checks import MAX_FRAME_BYTES, check_samples, decoded_png
+from hippodrome.sim.recording_checks import MAX_FRAME_BYTES, check_samples, decoded_png, require_checksum, with_checksum
 
 FORMAT = 1
 CHUNK_FRAMES = 250  # a few seconds of rendering: what a kill can cost at most, and what a second process can take over
@@ -146,7 +146,7 @@ def _said(error: Exception) -> str:
 def seal(folder: Path, content: dict[str, Any], samples: Samples) -> Recording:
     """Write the manifest: what the recording was made from, and the hash of each of its files."""
     names = ["samples.npz", "drive.npz", *(chunk_path(folder, chunk).name for chunk in range(chunk_count(samples)))]
-    manifest = {"format": FORMAT, **content, "sha256": {name: sha256_of(folder / name) for name in names}}
+    manifest = with_checksum({"format": FORMAT, **content, "sha256": {name: sha256_of(folder / name) for name in names}})
     with replacing(folder / MANIFEST) as temporary:
         temporary.write_text(json.dumps(manifest, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     return Recording(folder, manifest, samples)
@@ -159,6 +159,7 @@ def open_recording(folder: Path, verify: bool = True) -> Recording:
         manifest = json.loads(read_bounded(path, MAX_MANIFEST_BYTES).decode("utf-8"))
         files = manifest["sha256"]
         version = manifest["format"]
+        require_checksum(manifest)
     except FileNotFoundError:
         raise RecordingError(
             f"{folder}: not a finished recording (no {MANIFEST}); run `hippodrome render` to finish it"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import struct
 from collections.abc import Mapping
 from typing import Any, Final
@@ -19,6 +21,7 @@ PNG_HEAD: Final = struct.Struct(">8s4x4sII")  # signature, length and name of th
 MOST: Final = {
     "t_s": 1e11, "dt_s": 3600.0, "speed": 1e6, "yaw_rate_radps": 1e4, "poses_m": 1e9, "speed_mps": 1e4, "lane_position_m": 1e7,
 }  # fmt: skip
+CHECKSUM: Final = "manifest_sha256"  # of all else in a manifest; recordings of before it was written have none
 TRUTH: Final = ("poses_m", "speed_mps", "lane_position_m")  # nan where it is unknown
 
 
@@ -39,7 +42,7 @@ def check_samples(arrays: Mapping[str, np.ndarray[Any, Any]], most_steps: int) -
             raise ValueError(f"{name} is {array.dtype} {array.shape}, a recording of {count} steps has {shape}")
     for name, most in MOST.items():
         unknown = np.isnan(arrays[name]) if name in TRUTH else False
-        _require((np.abs(arrays[name]) <= most) | unknown, name, f"not finite, or beyond {most:g}")
+        _require((np.abs(arrays[name].astype(np.float64)) <= most) | unknown, name, f"not finite, or beyond {most:g}")
     _require(arrays["dt_s"] > 0.0, "dt_s", "not above zero")
     _require(np.diff(arrays["t_s"]) > 0.0, "t_s", "followed by an earlier or the same one")
     lanes = len(arrays["lane_ids"])
@@ -47,6 +50,34 @@ def check_samples(arrays: Mapping[str, np.ndarray[Any, Any]], most_steps: int) -
     numbers = arrays["frame"]
     if not np.array_equal(numbers[numbers >= 0], np.arange(np.count_nonzero(numbers >= 0))):
         raise ValueError("frame does not count the frames from 0 up")
+
+
+def check_truth(arrays: Mapping[str, np.ndarray[Any, Any]]) -> None:
+    """Raise ValueError, with the array and the row, unless the arrays of a truth with times of its own make one."""
+    shapes = {"t_s": (arrays["t_s"].size,), "has_heading": (1,), "poses_m": (arrays["t_s"].size, 3)}
+    for name, array in arrays.items():
+        shape = shapes.get(name, shapes["t_s"])
+        if array.shape != shape or array.dtype.kind != ("b" if name == "has_heading" else "f"):
+            raise ValueError(f"{name} is {array.dtype} {array.shape}, a truth of {arrays['t_s'].size} poses has {shape}")
+    for name, most in (("t_s", MOST["t_s"]), ("poses_m", MOST["poses_m"]), ("height_m", MOST["poses_m"])):
+        _require(np.abs(arrays[name].astype(np.float64)) <= most, name, f"not finite, or beyond {most:g}")
+    _require(~(arrays["sigma_m"] < 0.0), "sigma_m", "below zero")  # nan where it is unknown
+    _require(np.diff(arrays["t_s"]) > 0.0, "t_s", "followed by an earlier or the same one")
+
+
+def with_checksum(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """The manifest with a checksum of its own, over all else in it, however it is laid out as text."""
+    return {**manifest, CHECKSUM: _checksum(manifest)}
+
+
+def require_checksum(manifest: Mapping[str, Any]) -> None:
+    """Raise ValueError if a manifest has a checksum of its own that does not hold."""
+    if CHECKSUM in manifest and manifest[CHECKSUM] != _checksum({key: manifest[key] for key in manifest if key != CHECKSUM}):
+        raise ValueError(f"{CHECKSUM} does not hold: changed since it was written")
+
+
+def _checksum(manifest: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(manifest, sort_keys=True).encode()).hexdigest()
 
 
 def decoded_png(blob: bytes) -> Frame:

@@ -1,50 +1,41 @@
-"""Broken inputs, made of whole ones by seeded, structure-aware changes, and what may come of them.
+"""Broken inputs, made of whole ones, and what may come of them: ``make fuzz``.
 
-A reader joins by a ``Subject``: how its whole input is written, and the command that reads it. Every change is a function of a
-random generator, so a number says which input fell. ``python -m tests.broken --cases 3000 --seed 1`` runs a campaign over all
-subjects of tests/eval/exchange/subjects.py.
+A reader joins by a ``Subject``: how its whole input is written, and the command that reads it. Every change (tests/changes.py) is
+a function of a random generator, so a number says which input fell. ``python -m tests.broken --cases 3000 --seed 1`` breaks the
+inputs of tests/subjects.py and tests/eval/exchange/subjects.py; ``--only NAME --case NUMBER`` breaks one of them once more.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import io
-import json
-import re
+import os
 import resource
 import shutil
 import signal
+import sys
+import tempfile
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from hippodrome.eval.cli import main
+from tests.changes import change
 
 LONGEST_S: Final = 30  # a case that takes longer hangs
-LARGEST_KB: Final = 1 << 20  # of growth of the process in one case
-NASTY: Final = ("nan", "inf", "-inf", "1e308", "-1e300", "1e-320", "0", "-1", "9" * 20, "9" * 400, "9" * 5000, "1e400", "", "x",
-                "0x10", "٣", "²", "1_0", "\x00", "[red]", '"', "../../etc/passwd", "a" * 5000)  # fmt: skip
-LEAVES: Final = (
-    None,
-    True,
-    [],
-    {},
-    "",
-    "x",
-    -1,
-    0,
-    1e308,
-    10**30,
-    "nan",
-    [[[]]],
-    {"a": {}},
-    "\ud800x".encode("utf-8", "replace").decode(),
-)
+LARGEST_KB: Final = 1 << 20  # of growth of the process, or of a program that it started, in one case
+FAULTS: Final = ("traceback", "hang", "memory", "no sentence")
+
+
+class TooLong(BaseException):
+    """The alarm. It is no ``Exception``, and no ``OSError`` as ``TimeoutError`` is: a command would make a sentence of it."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +46,13 @@ class Subject:
     write: Callable[[Path], None]  # the whole input into an empty folder
     command: Callable[[Path, Path], list[str]]  # of (folder of the input, path of the result)
     files: str = "**/*"  # which of the files are changed
+    after: Callable[[np.random.Generator, Path], None] = lambda _rng, _folder: (
+        None
+    )  # done to the broken input: checksums, for one
+    statuses: tuple[int, ...] = (0, 2)  # that the command may end with
+    lines: int = 1  # how many the command may refuse with
+    longest_s: int = LONGEST_S
+    slow: bool = False  # left to campaigns: writing it takes minutes, or each case seconds
 
 
 @dataclass(frozen=True)
@@ -64,19 +62,6 @@ class Outcome:
     fault: str
     detail: str
     accepted: bool
-
-
-def change(rng: np.random.Generator, path: Path) -> str:
-    """Break a file in one way, and say which."""
-    data = path.read_bytes()
-    kinds: list[Callable[[np.random.Generator, bytes], bytes]] = [*BINARY]
-    if path.suffix in (".csv", ".txt", ".tum", ".yaml", ".gpx", ".nmea", ".json", ".geojson", ".catalog", ".log"):
-        kinds = [*TEXT, *TEXT, *BINARY[:2]]
-    if path.suffix in (".json", ".geojson", ".catalog"):
-        kinds += [_json_leaf] * 8
-    kind = kinds[int(rng.integers(len(kinds)))]
-    path.write_bytes(kind(rng, data))
-    return kind.__name__.strip("_")
 
 
 def run_case(subject: Subject, whole: Path, seed: int, place: Path) -> Outcome:
@@ -90,207 +75,115 @@ def run_case(subject: Subject, whole: Path, seed: int, place: Path) -> Outcome:
             files.setdefault(path.suffix, []).append(path)
     said = []
     for _ in range(int(rng.integers(1, 3))):
-        alike = list(files.values())[_some(rng, len(files))]
-        path = alike[_some(rng, len(alike))]
-        said.append(f"{path.name}: {change(rng, path)}")
-    return _run(subject.command(place / "in", place / "out"), f"seed {seed}: {'; '.join(said)}")
+        alike = list(files.values())[int(rng.integers(len(files)))]
+        path = alike[int(rng.integers(len(alike)))]
+        with contextlib.suppress(Exception):  # what is broken already may be none of its kind any more
+            said.append(f"{path.name}: {change(rng, path)}")
+    subject.after(rng, place / "in")
+    return _run(subject, subject.command(place / "in", place / "out"), f"case {seed}: {'; '.join(said)}")
 
 
-def _run(command: list[str], said: str) -> Outcome:
+def _run(subject: Subject, command: list[str], said: str) -> Outcome:
     out, err = io.StringIO(), io.StringIO()
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    before, began = _largest_kb(), time.monotonic()
     previous = signal.signal(signal.SIGALRM, _too_long)
-    signal.alarm(LONGEST_S)
+    signal.alarm(subject.longest_s)
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             status = main(command)
     except SystemExit as error:
         status = int(error.code or 0)
-    except TimeoutError:
+    except TooLong:
         return Outcome("hang", said, False)
     except BaseException as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
-        return Outcome(
-            "traceback",
-            f"{said}: {type(error).__name__}: {str(error)[:120]} at {Path(place.filename).name}:{place.lineno}",
-            False,
-        )
+        what = f"{type(error).__name__}: {str(error)[:120]} at {Path(place.filename).name}:{place.lineno}"
+        return Outcome("traceback", f"{said}: {what}", False)
     finally:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, previous)
-    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-    if grown > LARGEST_KB:
+    if (took_s := time.monotonic() - began) > subject.longest_s:
+        return Outcome("hang", f"{said}: {took_s:.0f} s", False)
+    if (grown := _largest_kb() - before) > LARGEST_KB:
         return Outcome("memory", f"{said}: {grown >> 10} MiB", False)
     lines = err.getvalue().strip().splitlines()
-    if status not in (0, 2) or (status == 2 and len(lines) != 1):
-        return Outcome("no sentence", f"{said}: status {status}, {len(lines)} lines: {' / '.join(lines)[:300]}", False)
     if "Traceback" in err.getvalue() or "fault of hippodrome" in err.getvalue():
-        return Outcome("traceback", f"{said}: {lines[-1][:200]}", False)
+        return Outcome("traceback", f"{said}: {lines[-1][:300]}", False)
+    if status not in subject.statuses or (status == 2 and not 1 <= len(lines) <= subject.lines):
+        return Outcome("no sentence", f"{said}: status {status}, {len(lines)} lines: {' / '.join(lines)[:300]}", False)
     return Outcome("", "", status == 0)
 
 
+def _largest_kb() -> int:
+    """Largest memory so far, of this process and of the largest program that it ran, together."""
+    return sum(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+
+
 def _too_long(*_: Any) -> None:
-    raise TimeoutError
+    raise TooLong
 
 
-def _lines(
-    change_lines: Callable[[np.random.Generator, list[bytes]], list[bytes]],
-) -> Callable[[np.random.Generator, bytes], bytes]:
-    def changed(rng: np.random.Generator, data: bytes) -> bytes:
-        return b"\n".join(change_lines(rng, data.split(b"\n")))
-
-    changed.__name__ = change_lines.__name__
-    return changed
-
-
-def _some(rng: np.random.Generator, count: int) -> int:
-    return int(rng.integers(max(count, 1)))
-
-
-@_lines
-def _line_lost(rng: np.random.Generator, lines: list[bytes]) -> list[bytes]:
-    at = _some(rng, len(lines))
-    return lines[:at] + lines[at + 1 + _some(rng, 3) :]
-
-
-@_lines
-def _line_twice(rng: np.random.Generator, lines: list[bytes]) -> list[bytes]:
-    at = _some(rng, len(lines))
-    return lines[:at] + [lines[at]] * int(rng.integers(1, 4)) + lines[at:]
-
-
-@_lines
-def _lines_swapped(rng: np.random.Generator, lines: list[bytes]) -> list[bytes]:
-    a, b = _some(rng, len(lines)), _some(rng, len(lines))
-    lines[a], lines[b] = lines[b], lines[a]
-    return lines
-
-
-@_lines
-def _column_lost(rng: np.random.Generator, lines: list[bytes]) -> list[bytes]:
-    at = _some(rng, len(lines))
-    words = re.split(rb"([,; \t])", lines[at])
-    lines[at] = b"".join(words[: -2 if len(words) > 2 else None])
-    return lines
-
-
-def _number(rng: np.random.Generator, data: bytes) -> bytes:
-    found = list(re.finditer(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?", data))
-    if not found:
-        return data
-    nasty = NASTY[_some(rng, len(NASTY))].encode()
-    one = found[_some(rng, len(found))]
-    return data[: one.start()] + nasty + data[one.end() :]
-
-
-def _numbers(rng: np.random.Generator, data: bytes) -> bytes:
-    """All numbers of one column, or all of one size, become another's."""
-    factor = float(rng.choice([1e9, -1.0, 0.0, 1e-9, 1e300]))
-    column = _some(rng, 9)
-
-    def scaled(line: bytes) -> bytes:
-        words = re.split(rb"([,; \t])", line)
-        with contextlib.suppress(ValueError, IndexError):
-            words[2 * column] = repr(float(words[2 * column]) * factor).encode()
-        return b"".join(words)
-
-    return b"\n".join(scaled(line) for line in data.split(b"\n"))
-
-
-def _cut(rng: np.random.Generator, data: bytes) -> bytes:
-    return data[: _some(rng, len(data))]
-
-
-def _noise(rng: np.random.Generator, data: bytes) -> bytes:
-    at = _some(rng, len(data))
-    return data[:at] + rng.integers(0, 256, int(rng.integers(1, 40)), np.uint8).tobytes() + data[at + _some(rng, 40) :]
-
-
-def _bit(rng: np.random.Generator, data: bytes) -> bytes:
-    broken = bytearray(data)
-    for _ in range(int(rng.integers(1, 6)) if data else 0):
-        broken[_some(rng, len(data))] ^= 1 << _some(rng, 8)
-    return bytes(broken)
-
-
-def _large(rng: np.random.Generator, data: bytes) -> bytes:
-    """Four or eight bytes, where a length may stand, become as large as they can."""
-    at, width = _some(rng, len(data)), int(rng.choice([1, 2, 4, 8]))
-    return data[:at] + rng.choice([b"\xff", b"\x7f", b"\x00"]) * width + data[at + width :]
-
-
-def _twice(rng: np.random.Generator, data: bytes) -> bytes:
-    a, b = sorted((_some(rng, len(data)), _some(rng, len(data))))
-    return data[:b] + data[a:b] * int(rng.integers(1, 3)) + data[b:]
-
-
-def _empty(_rng: np.random.Generator, _data: bytes) -> bytes:
-    return b""
-
-
-def _json_leaf(rng: np.random.Generator, data: bytes) -> bytes:
-    """One value of a JSON document, or of a line of one, becomes another."""
-    try:
-        whole = json.loads(data)
-        return json.dumps(_with_leaf(rng, whole)).encode()
-    except ValueError:
-        lines = data.split(b"\n")
-        at = _some(rng, len(lines))
-        with contextlib.suppress(ValueError):
-            lines[at] = json.dumps(_with_leaf(rng, json.loads(lines[at]))).encode()
-        return b"\n".join(lines)
-
-
-def _with_leaf(rng: np.random.Generator, value: Any) -> Any:
-    if isinstance(value, dict) and value and rng.random() < 0.85:
-        name = list(value)[_some(rng, len(value))]
-        if rng.random() < 0.15:
-            return {key: inner for key, inner in value.items() if key != name}
-        return {**value, name: _with_leaf(rng, value[name])}
-    if isinstance(value, list) and value and rng.random() < 0.85:
-        at = _some(rng, len(value))
-        return [*value[:at], _with_leaf(rng, value[at]), *value[at + 1 :]]
-    return LEAVES[_some(rng, len(LEAVES))]
-
-
-TEXT: Final = (_line_lost, _line_twice, _lines_swapped, _column_lost, _number, _number, _number, _numbers, _numbers, _empty)
-BINARY: Final = (_cut, _noise, _bit, _large, _twice, _empty)
-
-
-def campaign(subjects: Sequence[Subject], cases: int, seed: int, folder: Path) -> list[Outcome]:
-    """The outcomes of ``cases`` broken inputs, as many of each subject."""
-    found = []
+def campaign(subjects: Sequence[Subject], cases: int, seed: int, folder: Path, most_s: float, tell: Any = None) -> list[Outcome]:
+    """The outcomes of ``cases`` broken inputs, as many of each subject, in turns; fewer where ``most_s`` are over before."""
+    found: list[Outcome] = []
+    end_s, wholes = time.monotonic() + most_s, {subject.name: folder / f"whole-{subject.name}" for subject in subjects}
     for subject in subjects:
-        whole = folder / f"whole-{subject.name}"
-        whole.mkdir(parents=True)
-        subject.write(whole)
-        for number in range(cases // len(subjects)):
-            found.append((subject.name, run_case(subject, whole, seed * 1_000_000 + number, folder / "case")))
-    return [Outcome(one.fault, f"{name}: {one.detail}", one.accepted) for name, one in found]
+        wholes[subject.name].mkdir(parents=True)
+        subject.write(wholes[subject.name])
+    for number in range(-(-cases // max(len(subjects), 1))):
+        for subject in subjects:
+            if time.monotonic() > end_s:
+                return found
+            one = run_case(subject, wholes[subject.name], seed * 1_000_000 + number, folder / "case")
+            found.append(replace(one, detail=f"{subject.name}: {one.detail}"))
+            if tell is not None and one.fault:
+                tell(found[-1])
+    return found
 
 
-def _main() -> None:
-    import argparse
-    import tempfile
+def _again(subject: Subject, case: int, folder: Path) -> None:
+    """One case with all that it prints, and its traceback."""
+    (folder / "whole").mkdir()
+    subject.write(folder / "whole")
+    os.environ["HIPPODROME_TRACEBACK"] = "1"
+    kept = replace(subject, command=lambda source, out: print(shown := subject.command(source, out)) or shown)
+    print(run_case(kept, folder / "whole", case, folder / "case"))
+    print("status", main(subject.command(folder / "case" / "in", folder / "case" / "out2")))
 
+
+def _main() -> int:
     from tests.eval.exchange.subjects import SUBJECTS
+    from tests.subjects import MORE
 
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=300, help="how many (default: 300)")
+    parser.add_argument("--cases", type=int, default=1000, help="how many in all (default: 1000)")
     parser.add_argument("--seed", type=int, default=0, help="of the random changes (default: 0)")
-    parser.add_argument("--only", default="", help="names of subjects that begin so (default: all)")
+    parser.add_argument("--seconds", type=float, default=3600.0, help="after these nothing new is begun (default: 3600)")
+    parser.add_argument("--only", default="", help="names of subjects that begin so, with commas (default: all)")
+    parser.add_argument("--case", type=int, help="break one input of the subject --only as in this case, and show what happens")
+    parser.add_argument("--keep", type=Path, help="folder for the inputs; an empty one (default: one that is removed)")
     options = parser.parse_args()
-    subjects = [one for one in SUBJECTS if one.name.startswith(options.only)]
-    with tempfile.TemporaryDirectory() as folder:
-        found = campaign(subjects, options.cases, options.seed, Path(folder))
-    for one in found:
-        if one.fault:
-            print(f"{one.fault}: {one.detail}")
-    faults = {name: sum(one.fault == name for one in found) for name in ("traceback", "hang", "memory", "no sentence")}
+    subjects = [one for one in (*MORE, *SUBJECTS) if one.name.startswith(tuple(options.only.split(",")))]
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = options.keep or Path(temporary)
+        os.environ["TMPDIR"] = tempfile.tempdir = str(folder)
+        if options.case is not None:
+            _again(subjects[0], options.case, folder)
+            return 0
+        print(f"{options.cases} cases of {len(subjects)} readers, seed {options.seed}; limits: {LONGEST_S} s and "
+              f"{LARGEST_KB >> 10} MiB a case, {options.seconds:g} s in all", flush=True)  # fmt: skip
+        found = campaign(subjects, options.cases, options.seed, folder, options.seconds,
+                         lambda one: print(f"{one.fault}: {one.detail}", flush=True))  # fmt: skip
+    for subject in subjects:
+        own = [one for one in found if one.detail.startswith(f"{subject.name}: ")]
+        print(f"{subject.name:<18} {len(own):5d} cases {sum(one.accepted for one in own):5d} accepted "
+              f"{sum(bool(one.fault) for one in own):3d} fell")  # fmt: skip
+    faults = {name: sum(one.fault == name for one in found) for name in FAULTS}
     print(f"{len(found)} broken inputs, seed {options.seed}: {sum(one.accepted for one in found)} accepted, "
           + ", ".join(f"{count} {name}" for name, count in faults.items()))  # fmt: skip
+    return 1 if any(faults.values()) else 0
 
 
 if __name__ == "__main__":
-    _main()
+    sys.exit(_main())

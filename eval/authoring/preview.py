@@ -12,6 +12,7 @@ from hippodrome.core.types import FloatArray, Frame, IntArray
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.figures.frames import draw_contact_sheet
 from hippodrome.eval.figures.preview import draw_preview
+from hippodrome.eval.pool import worker_pool
 from hippodrome.sim.episode import Samples, draw_frame
 from hippodrome.sim.network import edge_lengths_m
 from hippodrome.sim.record import ROLES, RecordingPlan, Role, simulate
@@ -55,7 +56,7 @@ def preview_scenario(scenario: Scenario, out: Path) -> Preview:
     require_gl()
     plans = {role: RecordingPlan(scenario, role, out) for role in ROLES}
     town = plans["mapping"].town()
-    simulated = {role: simulate(plan) for role, plan in plans.items()}
+    simulated = dict(zip(plans, _simulated(scenario, list(plans.values())), strict=True))
     drives = {role: drive for role, (drive, _) in simulated.items()}
     samples = {role: sampled for role, (_, sampled) in simulated.items()}
     mapping, second = drives["mapping"], drives["localization"]
@@ -66,6 +67,15 @@ def preview_scenario(scenario: Scenario, out: Path) -> Preview:
     frames, captions = _stills(plans, town, preview)
     draw_contact_sheet(out / "stills.png", frames, captions, title=f"{scenario.name}: stills of the mapping and the second drive")
     return preview
+
+
+def _simulated(scenario: Scenario, plans: list[RecordingPlan]) -> list[tuple[Drive, Samples]]:
+    """The drives. Those on somebody's network are simulated in processes of their own: SUMO crashes on some networks."""
+    network = scenario.town.network
+    if network is None:
+        return [simulate(plan) for plan in plans]
+    with worker_pool(len(plans)) as pool:
+        return pool.run("simulate", simulate, plans, place=lambda _: str(network))
 
 
 def visits_of_road(network: RoadNetwork, lane: IntArray) -> IntArray:

@@ -22,8 +22,9 @@ from hippodrome.eval.methods.beforehand import Beforehand
 from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.eval.methods.stages import map_files, network_file, read_roads, refine_files
 from hippodrome.eval.real.drive import Drive
-from hippodrome.eval.real.findings import from_record, to_record, usual_error_m
+from hippodrome.eval.real.findings import to_record, usual_error_m
 from hippodrome.eval.real.findings_file import reference_of, tell_findings
+from hippodrome.eval.real.kept import read_breaks, read_findings, read_record
 from hippodrome.eval.real.page import drive_page
 from hippodrome.proto.codec import load_map
 from hippodrome.sim.geo_start import GeoStart
@@ -121,7 +122,7 @@ def run_drive(options: RunOptions) -> None:
     stages.run("score", None, lambda: _score(options, topometric, recording))
     stages.run("page", None, lambda: _write_page(options, recording, net_file, stages))
     cognitive_map = load_map(topometric)[0]
-    print(_verdict(cognitive_map, _read_breaks(out)))
+    print(_verdict(cognitive_map, read_breaks(out / REFINEMENT)))
     print(f"open {out / PAGE}")
 
 
@@ -145,15 +146,7 @@ def _check_same(out: Path, asked: Mapping[str, str]) -> None:
 
 def _record_of(out: Path) -> dict[str, Any]:
     path = out / RECORD
-    if not path.exists():
-        return {}
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(record, dict):
-            return record
-    except (OSError, ValueError, RecursionError) as error:
-        raise HippodromeError(f"{path}: cannot be read ({error}); choose a new --out") from None
-    raise HippodromeError(f"{path}: not the record of a run; choose a new --out")
+    return read_record(path) if path.exists() else {}
 
 
 def _content(path: Path) -> str:
@@ -195,16 +188,6 @@ def _refine(options: RunOptions, net_file: Path, topometric: Path) -> None:
     write_atomically(options.out / REFINEMENT, (json.dumps(content, indent=1) + "\n").encode())
 
 
-def _read_refinement(out: Path) -> dict[str, Any]:
-    content: dict[str, Any] = json.loads((out / REFINEMENT).read_text(encoding="utf-8"))
-    return content
-
-
-def _read_breaks(out: Path) -> tuple[MatchBreak, ...]:
-    found = ((one["first"], one["last"], MatchStatus[one["status"]], one["cause"]) for one in _read_refinement(out)["breaks"])
-    return tuple(MatchBreak(first, last, status, cause) for first, last, status, cause in found)
-
-
 def _score(options: RunOptions, topometric: Path, recording: Path) -> None:
     """The scores, where there is a truth; a map that cannot be scored is none that cannot be used."""
     try:
@@ -217,16 +200,16 @@ def _score(options: RunOptions, topometric: Path, recording: Path) -> None:
 
 
 def _write_page(options: RunOptions, recording: Path, net_file: Path, stages: _Stages) -> None:
-    refined = _read_refinement(options.out)
+    findings, map_error_m = read_findings(options.out / REFINEMENT)
     drive = Drive(
         name=options.drive.name,
         network=options.network.name,
         recording=open_recording(recording, verify=False),
         cognitive_map=load_map(options.out / TOPOMETRIC)[0],
         roads=_silently(lambda: read_roads(net_file, options.out)),
-        breaks=_read_breaks(options.out),
-        findings=tuple(map(from_record, refined.get("findings", []))),
-        map_error_m=refined.get("map_error_m"),
+        breaks=read_breaks(options.out / REFINEMENT),
+        findings=findings,
+        map_error_m=map_error_m,
         reference=reference_of(net_file),
         scores=tuple(stages.said("score")),
         notes=tuple(line for name in ("roads", "import", "refine") if name in stages.done for line in stages.said(name)),

@@ -19,7 +19,7 @@ from hippodrome.eval.pool import process_pool
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
-DIED = "its process died, also when it ran alone (out of memory?)"
+DIED = "its process died, also when it ran alone (out of memory, or a network that SUMO crashes on?)"
 CONNECT_S = 10.0  # a scheduler that does not answer in this time is not there
 
 

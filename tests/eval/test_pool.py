@@ -5,9 +5,11 @@ import re
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
+from hippodrome.core.types import HippodromeError
 from hippodrome.eval.pool import INTERRUPTED, worker_pool
 
 SCRIPT = """
@@ -32,6 +34,25 @@ if __name__ == "__main__":
 def test_results_come_in_the_order_of_the_tasks_and_then_of_those_that_follow():
     with worker_pool(2) as pool:
         assert pool.run("size", abs, [-8, 3, -5], follow=lambda size: -103 if size == 3 else None) == [8, 3, 5, 103]
+
+
+def _die(name):
+    """Ends the process as a library does that gives up, or as a system does that is out of memory."""
+    time.sleep(0.2)
+    if name.startswith("SIG"):
+        os.kill(os.getpid(), getattr(signal, name))
+    time.sleep(5.0)
+
+
+@pytest.mark.parametrize(("name", "said"), [
+    ("SIGABRT", r"drive: a worker process crashed \(SIGABRT\) over .*net SIGABRT.*; SUMO or another library cannot take it"),
+    ("SIGSEGV", r"drive: a worker process crashed \(SIGSEGV\) over .*net SIGSEGV.*"),
+    ("SIGKILL", r"drive: a worker process died over .*net SIGKILL.* \(out of memory\?\); run the same command again to resume"),
+])  # fmt: skip
+def test_a_worker_that_dies_is_told_with_what_it_worked_on(name, said):
+    with worker_pool(2) as pool, pytest.raises(HippodromeError, match=said) as caught:
+        pool.run("drive", _die, ["a", name], place=lambda item: f"net {item}")
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(("handler", "seconds", "status"), [("default_int_handler", 60.0, INTERRUPTED), ("SIG_IGN", 1.0, 0)])

@@ -23,7 +23,7 @@ from hippodrome.sim.recording import (
     write_arrays,
     write_chunk,
 )
-from hippodrome.sim.recording_checks import MAX_FRAME_BYTES, decoded_png
+from hippodrome.sim.recording_checks import CHECKSUM, MAX_FRAME_BYTES, check_truth, decoded_png, with_checksum
 
 STEPS = 20
 
@@ -52,8 +52,21 @@ def resealed(folder):
     """The recording with right hashes of whatever is in its files: somebody made it so on purpose."""
     manifest = json.loads((folder / MANIFEST).read_text())
     manifest["sha256"] = {name: sha256_of(folder / name) for name in manifest["sha256"]}
-    (folder / MANIFEST).write_text(json.dumps(manifest))
+    (folder / MANIFEST).write_text(json.dumps(with_checksum({key: manifest[key] for key in manifest if key != CHECKSUM})))
     return open_recording(folder)
+
+
+@pytest.mark.parametrize("change", [{"scenario": "tess"}, {"new": 1}, {CHECKSUM: "0" * 64}, {CHECKSUM: None}])
+def test_a_manifest_that_was_changed_is_refused(recording, change):
+    path = recording / MANIFEST
+    manifest = json.loads(path.read_text())
+    path.write_text(json.dumps({**manifest, **change}))
+    with pytest.raises(RecordingError, match="manifest_sha256 does not hold"):
+        open_recording(recording)
+    path.write_text(json.dumps(manifest, indent=7))
+    assert open_recording(recording).manifest == manifest
+    path.write_text(json.dumps({key: manifest[key] for key in manifest if key != CHECKSUM}))  # as before there was one
+    open_recording(recording)
 
 
 def with_value(name, value, row=3):
@@ -97,6 +110,28 @@ def test_truth_may_be_unknown(recording):
     write_arrays(recording / "samples.npz", arrays_of(speed_mps=unknown, lane_position_m=unknown, lane_ids=np.zeros(0, "<U1"),
                                                       lane=np.full(STEPS, -1, np.int32)))  # fmt: skip
     assert len(resealed(recording).samples.t_s) == STEPS
+
+
+@pytest.mark.parametrize(("changed", "reason"), [
+    ({"t_s": np.array(1.0)}, r"t_s is float64 \(\)"),
+    ({"t_s": np.array([1.0, 1.0])}, r"t_s\[0\] is followed by an earlier"),
+    ({"t_s": np.array([1, 2])}, "t_s is int64"),
+    ({"poses_m": np.zeros((3, 3))}, r"poses_m is float64 \(3, 3\), a truth of 2 poses has \(2, 3\)"),
+    ({"poses_m": np.full((2, 3), np.nan)}, r"poses_m\[0\] is not finite"),
+    ({"height_m": np.array([0.0, 1e300])}, r"height_m\[1\] is not finite, or beyond"),
+    ({"sigma_m": np.array([np.nan, -1.0])}, r"sigma_m\[1\] is below zero"),
+    ({"has_heading": np.array(True)}, r"has_heading is bool \(\)"),
+    ({"has_heading": np.array([1.0])}, "has_heading is float64"),
+    ({}, None),
+])  # fmt: skip
+def test_a_truth_with_times_of_its_own(changed, reason):
+    whole = {"t_s": np.array([1.0, 2.0]), "poses_m": np.zeros((2, 3)), "height_m": np.zeros(2),
+             "sigma_m": np.array([np.nan, 1.0]), "has_heading": np.array([True])}  # fmt: skip
+    if reason is None:
+        check_truth(whole)
+        return
+    with pytest.raises(ValueError, match=reason):
+        check_truth({**whole, **changed})
 
 
 def npz(**members):

@@ -19,6 +19,7 @@ from hippodrome.eval.exchange.drives.images import decode
 from hippodrome.eval.exchange.drives.truth import TRUTH_FILE
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import CHUNK_FRAMES, FORMAT, MANIFEST, chunk_count, chunk_path, write_arrays, write_chunk
+from hippodrome.sim.recording_checks import with_checksum
 
 FOV_DEG: Final = (20.0, 150.0)  # fields of view that a camera of ours can have; others are left out as unknown
 
@@ -95,5 +96,5 @@ def seal(folder: Path, content: dict[str, Any], samples: Samples) -> None:
     names = ["samples.npz", *(chunk_path(folder, chunk).name for chunk in range(chunk_count(samples)))]
     if (folder / TRUTH_FILE).exists():
         names.append(TRUTH_FILE)
-    manifest = {"format": FORMAT, **content, "sha256": {name: sha256_of(folder / name) for name in names}}
+    manifest = with_checksum({"format": FORMAT, **content, "sha256": {name: sha256_of(folder / name) for name in names}})
     write_atomically(folder / MANIFEST, (json.dumps(manifest, indent=1, sort_keys=True) + "\n").encode())

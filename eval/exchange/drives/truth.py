@@ -20,6 +20,7 @@ from hippodrome.eval.files.fixes import is_fix_file, read_fixes
 from hippodrome.eval.files.spatial import Axes, SpatialPoses, flatten, level, lifted, read_poses
 from hippodrome.sim.georeference import GeoReference, read_georeference
 from hippodrome.sim.recording import Recording, RecordingError, read_arrays, write_arrays
+from hippodrome.sim.recording_checks import check_truth
 
 TRUTH_FILE: Final = "truth.npz"
 STANDING_M: Final = 0.5  # fixes nearer than this to one another say nothing of a direction
@@ -118,11 +119,10 @@ def stored_truth(recording: Recording) -> Truth | None:
         return None if steps is None else replace(truth_of_trajectory(steps), ahead_m=_ahead_m(recording))
     try:
         arrays = read_arrays(path, ["t_s", "poses_m", "height_m", "sigma_m", "has_heading"])
-    except (OSError, KeyError, ValueError, EOFError) as error:
-        raise RecordingError(f"{path}: cannot be read ({error}); import the drive anew") from None
-    count = len(arrays["t_s"])
-    if arrays["poses_m"].shape != (count, 3) or arrays["height_m"].shape != (count,) or arrays["sigma_m"].shape != (count,):
-        raise RecordingError(f"{path}: its arrays do not fit together; import the drive anew")
+        check_truth(arrays)
+    except Exception as error:  # NumPy, zipfile and zlib have many
+        said = " ".join(str(error).split())[:200] or type(error).__name__
+        raise RecordingError(f"{path}: cannot be read ({said}); import the drive anew") from None
     trajectory = Trajectory(arrays["t_s"], arrays["poses_m"])
     heading, ahead_m = bool(arrays["has_heading"][0]), _ahead_m(recording)
     return Truth(trajectory, arrays["height_m"], arrays["sigma_m"], heading, False, ahead_m=ahead_m)

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import yaml
 
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.exchange.drives.calibration import Calibration
 from hippodrome.eval.exchange.drives.errors import ExchangeError
-from hippodrome.eval.exchange.readers.text import read_lines
+from hippodrome.eval.exchange.readers.text import read_lines, read_values
 
 MAX_SIDE_PX: Final = 100_000  # of an image
 NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
@@ -41,10 +40,7 @@ def read_calibration(path: Path) -> Calibration:
 def _of_yaml(path: Path, text: str) -> Calibration:
     """A calibration in YAML, also of OpenCV's kind, whose head and tags YAML itself does not know."""
     plain = re.sub(r"!!?opencv-[\w-]+", "", re.sub(r"(?m)^%YAML.*$", "", text))
-    try:
-        values: Any = yaml.safe_load(plain)
-    except (yaml.YAMLError, RecursionError) as error:
-        raise ExchangeError(f"{path}: not a calibration ({' '.join(str(error).split())[:80]}); known are {KNOWN}") from None
+    values = read_values(path, plain)
     if not isinstance(values, dict):
         raise ExchangeError(f"{path}: not a calibration; known are {KNOWN}")
     matrix = _array(path, values, MATRICES, 9)

@@ -7,14 +7,18 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Final, cast
 
 import lz4.frame
 import rosbags.rosbag1.reader
+import rosbags.rosbag2.reader
+import rosbags.rosbag2.storage_mcap
 import zstandard
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
+from hippodrome._files import read_bounded
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignDrive
@@ -40,6 +44,8 @@ from hippodrome.eval.exchange.readers.messages import (
     truth_of_poses,
 )
 from hippodrome.eval.exchange.readers.spool import Spool
+from hippodrome.eval.exchange.readers.text import read_values
+from hippodrome.sim.yaml_file import MAX_BYTES
 
 KINDS: Final[dict[str, Kind]] = {
     "sensor_msgs/msg/CompressedImage": "images",
@@ -47,6 +53,7 @@ KINDS: Final[dict[str, Kind]] = {
     "nav_msgs/msg/Odometry": "odometry",
     "geometry_msgs/msg/PoseStamped": "poses",
 }
+ZSTD_MAGIC: Final = b"\x28\xb5\x2f\xfd"
 CURE: Final = (
     "copy it anew; `rosbag reindex` or `ros2 bag reindex` mend an index; of a ROS 2 bag the .mcap file itself can be imported"
 )
@@ -59,7 +66,7 @@ def read_rosbag(path: Path, axes: Axes, topics: Sequence[str] = ()) -> ForeignDr
     """
     try:
         _require_bounded(path)
-        with _bounded_chunks(), AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+        with _bounded_chunks(_most_bytes(path)), AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
             of_type = {one.topic: one.msgtype for one in bag.connections}
             chosen = choose(path, {topic: (KINDS.get(name, ""), name) for topic, name in of_type.items()}, topics)
             spool = Spool()
@@ -96,12 +103,16 @@ def _messages(path: Path, bag: AnyReader, topic: str, spool: Spool) -> list[Stam
 
 def _require_bounded(path: Path) -> None:
     """Raise ExchangeError if a file of a ROS 2 bag is damaged, or unpacks to far more than it is."""
+    if path.is_dir() and (listed := path / "metadata.yaml").exists():
+        read_values(listed, read_bounded(listed, MAX_BYTES).decode("utf-8"))  # its aliases make no more than a bag has
     for file in sorted(path.iterdir()) if path.is_dir() else ():
-        if file.suffix == ".mcap" and _begins_with(file, MAGIC):
+        if not file.is_file():
+            continue
+        if _begins_with(file, MAGIC):
             for _ in records(file, Reach()):
                 pass
-        elif file.suffix in (".zst", ".zstd"):
-            limit, count = max(FREE_BYTES, MAX_GROWTH * file.stat().st_size), 0
+        elif _begins_with(file, ZSTD_MAGIC):
+            limit, count = _most_bytes(file), 0
             with (
                 file.open("rb") as stream,
                 zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES).stream_reader(stream) as plain,
@@ -117,21 +128,44 @@ def _begins_with(path: Path, magic: bytes) -> bool:
         return stream.read(len(magic)) == magic
 
 
+def _most_bytes(path: Path) -> int:
+    """How much a file, or the files of a folder, may unpack to."""
+    files = [one for one in path.iterdir() if one.is_file()] if path.is_dir() else [path]
+    return max(FREE_BYTES, MAX_GROWTH * sum(one.stat().st_size for one in files))
+
+
 @contextmanager
-def _bounded_chunks() -> Iterator[None]:
-    """While this holds, rosbags unpacks chunks of ROS 1 bags to ``MAX_CHUNK_BYTES`` at most; its own functions know no limit."""
-    known = rosbags.rosbag1.reader.decompressors
-    before = dict(known)
-    known["bz2"] = lambda data: _bounded(bz2.BZ2Decompressor(), data)
-    known["lz4"] = lambda data: _bounded(lz4.frame.LZ4FrameDecompressor(), data)
+def _bounded_chunks(most_bytes: int) -> Iterator[None]:
+    """While this holds, rosbags unpacks no chunk and no message to more than ``MAX_CHUNK_BYTES``, and all messages of a ROS 2 bag
+    to no more than ``most_bytes``; its own functions know no limit.
+    """
+    reader: Any = rosbags.rosbag2.reader
+    one, two, unpacked = rosbags.rosbag1.reader.decompressors, rosbags.rosbag2.storage_mcap.DECOMPRESSORS, [0]
+    before, before_two, zstd = dict(one), dict(two), reader.zstd
+
+    def message(data: bytes) -> bytes:
+        found = _bounded(zstd.ZstdDecompressor(), data)
+        unpacked[0] += len(found)
+        if unpacked[0] > most_bytes:
+            raise ExchangeError(f"its messages unpack to more than {most_bytes} bytes; it is no log of a drive")
+        return found
+
+    one["bz2"] = lambda data: _bounded(bz2.BZ2Decompressor(), data)
+    one["lz4"] = two_lz4 = lambda data, _=0: _bounded(lz4.frame.LZ4FrameDecompressor(), data)
+    two.update({"lz4": two_lz4, "zstd": lambda data, _: _bounded(zstd.ZstdDecompressor(), data)})
+    reader.zstd = SimpleNamespace(open=zstd.open, decompress=message)
     try:
         yield
     finally:
-        known.update(before)
+        one.update(before)
+        two.update(before_two)
+        reader.zstd = zstd
 
 
 def _bounded(unpacker: Any, data: bytes) -> bytes:
     found: bytes = unpacker.decompress(data, max_length=MAX_CHUNK_BYTES + 1)
     if len(found) > MAX_CHUNK_BYTES:
         raise ExchangeError(f"a chunk of more than {MAX_CHUNK_BYTES} bytes when unpacked; record it with smaller chunks")
+    if not unpacker.eof:
+        raise ExchangeError("a chunk ends before what is packed in it does; copy the bag anew")
     return found

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.exchange.drives.camera import OPTICAL_IN_BODY
@@ -25,7 +23,7 @@ from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.drives.tables import ODOMETRY
 from hippodrome.eval.exchange.readers.motion_csv import read_motion
 from hippodrome.eval.exchange.readers.pictures import image_files
-from hippodrome.eval.exchange.readers.text import inside, read_lines, read_table
+from hippodrome.eval.exchange.readers.text import inside, read_lines, read_table, read_values
 
 KITTI_CAMERAS = ("image_2", "image_0", "image_3", "image_1")
 EUROC_ODOMETRY = Path("odometry0", "data.csv")
@@ -172,8 +170,8 @@ def _euroc_focal(path: Path) -> float | None:
     """Focal length in pixels from ``sensor.yaml``; None if there is no such file, or no intrinsics in it."""
     if not path.exists():
         return None
+    values = read_values(path, "\n".join(line for line in read_lines(path) if not line.startswith("%YAML")))
     try:
-        values: Any = yaml.safe_load("\n".join(line for line in read_lines(path) if not line.startswith("%YAML")))
         return float(values["intrinsics"][0]) if isinstance(values, dict) and "intrinsics" in values else None
-    except (yaml.YAMLError, ValueError, TypeError, IndexError, KeyError, OverflowError, RecursionError) as error:
+    except (ValueError, TypeError, IndexError, KeyError, OverflowError) as error:
         raise ExchangeError(f"{path}: not a sensor description ({' '.join(str(error).split())[:80]})") from None

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from hippodrome._files import read_bounded
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.exchange.drives.errors import ExchangeError
+from hippodrome.sim.yaml_file import MAX_BYTES, ScenarioError, parse_yaml
 
 MAX_TABLE_BYTES: Final = 512 << 20
 
@@ -47,11 +49,19 @@ def read_table(path: Path, columns: int, separator: str | None = None, exactly: 
 def read_lines(path: Path) -> list[str]:
     """Lines of a text file of at most ``MAX_TABLE_BYTES``. Raises ExchangeError."""
     try:
-        if (size := path.stat().st_size) > MAX_TABLE_BYTES:
-            raise ExchangeError(f"{path}: {size} bytes, the limit is {MAX_TABLE_BYTES}")
-        return path.read_text(encoding="utf-8-sig").splitlines()
+        return read_bounded(path, MAX_TABLE_BYTES).decode("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise ExchangeError(f"{path}: cannot be read as text: {error}") from None
+
+
+def read_values(path: Path, text: str) -> Any:
+    """The values of the YAML text of a file, whose size, aliases and merge keys are bounded. Raises ExchangeError."""
+    if len(text) > MAX_BYTES:
+        raise ExchangeError(f"{path}: {len(text)} characters of YAML, the limit is {MAX_BYTES}; it is no description of a sensor")
+    try:
+        return parse_yaml(text, str(path))[1]
+    except ScenarioError as error:
+        raise ExchangeError(str(error)) from None
 
 
 def inside(folder: Path, name: str, listed_in: Path) -> Path:

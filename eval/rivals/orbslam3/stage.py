@@ -150,7 +150,7 @@ def _prepared(scenario: Scenario, out: Path, seconds: float | None, pool: Worker
     frames = None if seconds is None else ceil(seconds * stereo.camera.rate_hz)
     if frames is not None and frames < 2:
         raise HippodromeError(f"--seconds {seconds:g}: fewer than two frames, give a longer time")
-    pool.run("simulate", prepare, [mapping, *others])
+    pool.run("simulate", prepare, [mapping, *others], place=lambda plan: plan.scenario.name)
     drive = stereo_drive(mapping, frames)
     words = VocabularyTask(stereo.camera, scenario.seed, out)
     tasks: list[VocabularyTask | tuple[RecordingPlan, int]] = [words, *((mapping, chunk) for chunk in missing_chunks(drive))]

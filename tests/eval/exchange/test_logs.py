@@ -13,12 +13,16 @@ pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
 import lz4.frame
+import rosbags.rosbag2.reader as rosbag2_reader
 import zstandard
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.Odometry_pb2 import Odometry
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.writer import CompressionType, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.cli import main
@@ -28,7 +32,7 @@ from hippodrome.eval.exchange.drives.images import decode
 from hippodrome.eval.exchange.readers.mcap_file import read_mcap
 from hippodrome.eval.exchange.readers.messages import OdometryRow, PoseRow, Stamped, choose, in_order, motion_of_odometry
 from hippodrome.eval.exchange.readers.pixels import ENCODINGS, png_of
-from hippodrome.eval.exchange.readers.rosbag import _bounded
+from hippodrome.eval.exchange.readers.rosbag import _bounded, _bounded_chunks, read_rosbag
 
 COUNT = 40
 PNG = cv2.imencode(".png", np.random.default_rng(0).integers(0, 256, (16, 24, 3), np.uint8))[1].tobytes()
@@ -159,6 +163,40 @@ def test_bombs_and_lies_about_sizes_are_refused(tmp_path, content, complaint):
 def test_a_bomb_in_a_ros_bag_is_refused():
     with pytest.raises(HippodromeError, match="more than 134217728"):
         _bounded(lz4.frame.LZ4FrameDecompressor(), lz4.frame.compress(bytes(140_000_000)))
+
+
+def zstd_bag(folder, mode, body):
+    """A ROS 2 bag of one message per topic whose bytes are ``body``, packed by message or as a whole file."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    writer = Writer2(folder, version=8)
+    writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
+    with writer as bag:
+        for topic, kind in (("/camera", "sensor_msgs/msg/CompressedImage"), ("/odom", "nav_msgs/msg/Odometry")):
+            bag.write(bag.add_connection(topic, kind, typestore=store), 10**9, body)
+    return folder
+
+
+def test_messages_of_a_ros_2_bag_unpack_within_bounds(tmp_path):
+    """rosbags itself knows no limit: a message of 5 kB would take 150 MB, and a thousand of them all there is."""
+    with pytest.raises(HippodromeError, match="more than 134217728 bytes when unpacked"):
+        read_rosbag(zstd_bag(tmp_path / "message", "MESSAGE", bytes(150_000_000)), "body")
+    with _bounded_chunks(3000):
+        assert rosbag2_reader.zstd.decompress(zstandard.compress(bytes(2000))) == bytes(2000)
+        with pytest.raises(HippodromeError, match="it is no log of a drive"):
+            rosbag2_reader.zstd.decompress(zstandard.compress(bytes(2000)))
+    with pytest.raises(HippodromeError, match="ends before"), _bounded_chunks(3000):
+        rosbag2_reader.zstd.decompress(zstandard.compress(bytes(2000))[:-3])
+
+
+def test_the_list_of_a_ros_2_bag_is_bounded(tmp_path):
+    bag = zstd_bag(tmp_path / "bag", "MESSAGE", b"x")
+    lines = ["a0: &a0 [0]", *(f"a{n}: &a{n} [{', '.join(9 * [f'*a{n - 1}'])}]" for n in range(1, 9))]
+    (bag / "metadata.yaml").write_text("\n".join(lines))
+    with pytest.raises(HippodromeError, match="aliases and merge keys"):
+        read_rosbag(bag, "body")
+    (bag / "metadata.yaml").write_bytes(b"#" * 2_000_000)
+    with pytest.raises(HippodromeError, match="more than 1048576 bytes"):
+        read_rosbag(bag, "body")
 
 
 def test_messages_that_are_none_are_named(tmp_path):

@@ -3,6 +3,7 @@
 import gzip
 import json
 import re
+import shutil
 import zipfile
 from pathlib import Path
 
@@ -93,6 +94,25 @@ def test_a_run_that_was_killed_resumes(drive, finished, capsys):
     assert main(["run", str(drive[0]), "--network", str(drive[1]), "--out", str(finished)]) == DONE
     said = capsys.readouterr().out
     assert "2/5 map: done before" in said and "3/5 refine ..." in said and (finished / "refinement.json").exists()
+
+
+@pytest.mark.parametrize(("name", "text", "said"), [
+    ("run.json", '{"stages": []}', "stages: Input should be a valid dictionary: not the record of a run; choose a new --out"),
+    ("run.json", '{"asked": {"MAP": 3}}', "asked.MAP: Input should be a valid string"),
+    ("run.json", '{"stages": {"map": {"seconds": 1}}}', "stages.map.said: Field required"),
+    ("run.json", "[", "not the record of a run"),
+    ("run.json", "9" * 5000, "not the record of a run"),
+    ("refinement.json", "{", "not the breaks of a refinement; delete it, and the same command makes it anew"),
+    ("refinement.json", '{"breaks": [{"first": 0, "last": 1, "status": "X", "cause": ""}]}', "'X' is no status of a match"),
+    ("refinement.json", '{"breaks": [{"first": 0}]}', "breaks.0.last: Field required"),
+])  # fmt: skip
+def test_what_a_run_keeps_is_not_believed_blindly(drive, finished, tmp_path, capsys, name, text, said):
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    (out / name).write_text(text)
+    assert main(["run", str(drive[0]), "--network", str(drive[1]), "--out", str(out)]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert f"{out / name}: " in line and said in line
 
 
 def test_results_of_another_map_are_not_mixed_in(drive, finished, tmp_path, capsys):

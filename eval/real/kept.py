@@ -1,0 +1,81 @@
+"""What a run keeps beside its results, read back as if anybody had written it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+
+from hippodrome._files import read_bounded
+from hippodrome.core.types import HippodromeError, MatchBreak, MatchStatus
+from hippodrome.eval.real.findings import Finding, from_record
+
+MAX_BYTES: Final = 16 << 20  # of a file that is kept; a run of hours writes some 100 kB
+
+
+class _Stage(BaseModel):
+    """A finished stage: seconds, and the lines that it said."""
+
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+    seconds: float | None
+    said: list[str]
+
+
+class _Record(BaseModel):
+    """``run.json``. What an earlier version did not write yet may be missing."""
+
+    asked: dict[str, str] = {}
+    stages: dict[str, _Stage] = {}
+
+
+class _Break(BaseModel):
+    first: int
+    last: int
+    status: str
+    cause: str
+
+
+class _Refinement(BaseModel):
+    breaks: list[_Break]
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """What was asked of an earlier run, and the stages that it finished. Raises HippodromeError."""
+    record: _Record = _read(path, TypeAdapter(_Record), "not the record of a run; choose a new --out")
+    return record.model_dump(exclude_unset=True)
+
+
+def read_breaks(path: Path) -> tuple[MatchBreak, ...]:
+    """The breaks that the refinement left, as numbers of vertices. Raises HippodromeError."""
+    cure = "not the breaks of a refinement; delete it, and the same command makes it anew"
+    found = _read(path, TypeAdapter(_Refinement), cure).breaks
+    if unknown := [one.status for one in found if one.status not in MatchStatus.__members__]:
+        raise HippodromeError(f"{path}: '{unknown[0][:40]}' is no status of a match: {cure}")
+    return tuple(MatchBreak(one.first, one.last, MatchStatus[one.status], one.cause) for one in found)
+
+
+def read_findings(path: Path) -> tuple[tuple[Finding, ...], float | None]:
+    """Where the map seemed wrong, and its usual error in metres; a refinement of an earlier version has neither.
+
+    Raises HippodromeError.
+    """
+    cure = "not the findings of a refinement; delete it, and the same command makes it anew"
+    content = _read(path, TypeAdapter(dict[str, Any]), cure)
+    try:
+        error_m = content.get("map_error_m")
+        return tuple(map(from_record, content.get("findings", []))), None if error_m is None else float(error_m)
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise HippodromeError(f"{path}: {' '.join(str(error).split())[:200]}: {cure}") from None
+
+
+def _read(path: Path, model: TypeAdapter[Any], complaint: str) -> Any:
+    try:
+        return model.validate_python(json.loads(read_bounded(path, MAX_BYTES).decode("utf-8")))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise HippodromeError(f"{path}: {place}: {first['msg']}: {complaint}") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise HippodromeError(f"{path}: {' '.join(str(error).split())[:200]}: {complaint}") from None

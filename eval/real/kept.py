@@ -56,8 +56,8 @@ def read_breaks(path: Path) -> tuple[MatchBreak, ...]:
     return tuple(MatchBreak(one.first, one.last, MatchStatus[one.status], one.cause) for one in found)
 
 
-def read_findings(path: Path) -> tuple[tuple[Finding, ...], float | None]:
-    """Where the map seemed wrong, and its usual error in metres; a refinement of an earlier version has neither.
+def read_findings(path: Path) -> tuple[tuple[Finding, ...], tuple[float, float] | None]:
+    """Where the map seemed wrong, and its usual error east and north in metres; a refinement of an earlier version has neither.
 
     Raises HippodromeError.
     """
@@ -65,7 +65,10 @@ def read_findings(path: Path) -> tuple[tuple[Finding, ...], float | None]:
     content = _read(path, TypeAdapter(dict[str, Any]), cure)
     try:
         error_m = content.get("map_error_m")
-        return tuple(map(from_record, content.get("findings", []))), None if error_m is None else float(error_m)
+        return tuple(map(from_record, content.get("findings", []))), None if error_m is None else (
+            float(error_m[0]),
+            float(error_m[1]),
+        )
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise HippodromeError(f"{path}: {' '.join(str(error).split())[:200]}: {cure}") from None
 

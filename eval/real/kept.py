@@ -57,7 +57,7 @@ def read_breaks(path: Path) -> tuple[MatchBreak, ...]:
 
 
 def read_findings(path: Path) -> tuple[tuple[Finding, ...], tuple[float, float] | None]:
-    """Where the map seemed wrong, and its usual error east and north in metres; a refinement of an earlier version has neither.
+    """Where the map seemed wrong, and its median and 95 % error in metres; a refinement of an earlier version has neither.
 
     Raises HippodromeError.
     """

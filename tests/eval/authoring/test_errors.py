@@ -89,7 +89,12 @@ def test_notes_have_a_place_and_a_cure():
     """On a real network that has most kinds of oddities, and with notes of the others."""
     town = read_town(Path(sumo.SUMO_HOME) / "tools" / "game" / "bs3d" / "bs.net.xml")
     coincident = tuple(f"nodes a{i} and b coincide at ({i}.0, 2.0) m but are not connected" for i in range(5))
-    others = "1 street(s) have one lane for both directions, for instance a and b", "a.net.xml has no lanes inside junctions"
+    others = (
+        "1 street(s) have one lane for both directions, for instance a and b",
+        "a.net.xml has no lanes inside junctions",
+        "streets a and b cross without a junction",
+        "the signals of 1 junction(s) wait for a hand",
+    )
     notes = network_notes(Scenario(name="a"), SimpleNamespace(network=town.network, notes=(*town.notes, *coincident, *others)))
     for words, cure in CURES.items():
         assert any(words in note and note.endswith(cure) for note in notes), words

@@ -12,6 +12,7 @@ from hippodrome._files import read_bounded
 from hippodrome.core.types import HippodromeError, MatchBreak, MatchStatus
 from hippodrome.eval.real.findings import Finding, from_record
 
+REFINE_AGAIN: Final = "not the breaks of a refinement; delete it, and the same command makes it anew"
 MAX_BYTES: Final = 16 << 20  # of a file that is kept; a run of hours writes some 100 kB
 
 
@@ -49,10 +50,9 @@ def read_record(path: Path) -> dict[str, Any]:
 
 def read_breaks(path: Path) -> tuple[MatchBreak, ...]:
     """The breaks that the refinement left, as numbers of vertices. Raises HippodromeError."""
-    cure = "not the breaks of a refinement; delete it, and the same command makes it anew"
-    found = _read(path, TypeAdapter(_Refinement), cure).breaks
+    found = _read(path, TypeAdapter(_Refinement), REFINE_AGAIN).breaks
     if unknown := [one.status for one in found if one.status not in MatchStatus.__members__]:
-        raise HippodromeError(f"{path}: '{unknown[0][:40]}' is no status of a match: {cure}")
+        raise HippodromeError(f"{path}: '{unknown[0][:40]}' is no status of a match: {REFINE_AGAIN}")
     return tuple(MatchBreak(one.first, one.last, MatchStatus[one.status], one.cause) for one in found)
 
 
@@ -61,8 +61,7 @@ def read_findings(path: Path) -> tuple[tuple[Finding, ...], tuple[float, float] 
 
     Raises HippodromeError.
     """
-    cure = "not the findings of a refinement; delete it, and the same command makes it anew"
-    content = _read(path, TypeAdapter(dict[str, Any]), cure)
+    content = _read(path, TypeAdapter(dict[str, Any]), REFINE_AGAIN)
     try:
         error_m = content.get("map_error_m")
         return tuple(map(from_record, content.get("findings", []))), None if error_m is None else (
@@ -70,7 +69,7 @@ def read_findings(path: Path) -> tuple[tuple[Finding, ...], tuple[float, float] 
             float(error_m[1]),
         )
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise HippodromeError(f"{path}: {' '.join(str(error).split())[:200]}: {cure}") from None
+        raise HippodromeError(f"{path}: {' '.join(str(error).split())[:200]}: {REFINE_AGAIN}") from None
 
 
 def _read(path: Path, model: TypeAdapter[Any], complaint: str) -> Any:

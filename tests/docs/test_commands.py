@@ -228,7 +228,8 @@ def files(run, tmp_path_factory):
     placed, fixes = on_earth(network, mapping, folder)
     return {
         "karlsruhe.net.xml": placed, "phone.gpx": fixes,
-        "RECORDING": mapping, "OTHER_RECORDING": drive, "FOLDER": mapping, "DIR": run.out, "A": run.out, "B": run.out, "out/eval": run.out, "out/mine": run.out,
+        "RECORDING": mapping, "OTHER_RECORDING": drive, "FOLDER": mapping, "DIR": run.out, "A": run.out, "B": run.out,
+        "out/eval": run.out, "out/mine": run.out,
         "SOURCE": next(path.parent for path in folder.rglob("rgb.txt")),
         "town.net.xml": network, "FILE": imported, "my_town.osm": imported, "map.osm": imported,
         "semi.pbstream": run.out / "hamlet/semi-metric.pbstream", "topo.pbstream": run.out / "hamlet/topometric-default.pbstream",

@@ -68,7 +68,7 @@ def test_pinholes(tmp_path, text):
         ("1 2 3 4 5 6 7 8 9", "not a camera matrix"),
         ("camera_matrix: [1, 2]", "2 numbers in a matrix of 9"),
         ("a: b", "no camera_matrix in it"),
-        ("a: [", "not a calibration"),
+        ("a: [", "not valid YAML"),
         (ROS.replace("0.002, 0]", "0.002, 0, 7]"), "6 distortion coefficients"),
         (ROS.replace("[40,", "[many,"), "not numbers"),
     ],

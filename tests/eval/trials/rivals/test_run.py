@@ -25,7 +25,7 @@ SCENARIO = "name: hamlet\ntown: {kind: grid, width_m: 150, height_m: 150, road_k
 def scenario(tmp_path, monkeypatch):
     """A scenario file; its evaluation is stood in for, and nothing can be installed."""
 
-    def evaluate(paths, network, seed, workers, out):
+    def evaluate(paths, network, seed, workers, out, methods=()):
         row = Row(method="semi-metric", cpu_percent=0.3)
         network = Network(generator="grid", edges=8, km=0.9)
         result = ScenarioResult(name="hamlet", seed=1, network=network, noise="paper", frames=9, duration_s=9.0, rows=(row,))
@@ -40,6 +40,7 @@ def scenario(tmp_path, monkeypatch):
     monkeypatch.setattr(run, "gather", lambda scenario, out: None)
     monkeypatch.setattr(run, "with_peak_rss", lambda results, scenario, out, pool: results)
     monkeypatch.setattr(run, "localize_sequences", lambda materials: [])
+    monkeypatch.setattr(run, "localize_added", lambda materials, length_m: [])
     path = tmp_path / "hamlet.yaml"
     path.write_text(SCENARIO)
     return path

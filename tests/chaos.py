@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -46,6 +47,8 @@ if __name__ == "__main__":
         print(cluster.scheduler_address, *(worker.pid for worker in cluster.workers.values()), flush=True)
         sys.stdin.read()
 """
+# Progress without a terminal, and what Python says when it cleans up after a killed main process.
+EXPECTED_LINE = re.compile(r"^[\w -]+: \d+ of \d+ done$|resource_tracker")
 
 
 @dataclass(frozen=True)
@@ -156,9 +159,7 @@ class Chaos:
         faults = [] if status in (0, *ENDS[attempt.target]) else [f"ended: status {status}: {said[-300:]}"]
         if status is None:
             faults = ["hang: the command that was hit"]
-        lines = [
-            line for line in said.strip().splitlines() if "resource_tracker" not in line
-        ]  # Python cleans up after a killed main
+        lines = [line for line in said.strip().splitlines() if not EXPECTED_LINE.search(line)]
         if "Traceback" in said or (status not in (0, 1) and len(lines) > 1):
             faults.append(f"traceback: {said[-400:]}")
         end_s = time.monotonic() + ORPHAN_S

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from hippodrome import _files
+from hippodrome import _files, _folders
 from hippodrome._files import code_sha256, replacing, sha256_of, write_atomically
 from hippodrome.core.types import HippodromeError
 
@@ -81,9 +81,11 @@ def test_the_hash_of_code_is_of_names_and_contents_also_behind_a_link(tmp_path):
 
 
 def test_it_lies_beneath_all_parts():
-    """It imports the standard library and the error of ``core.types``, so that every part may import it."""
+    """They import the standard library, each other and the error of ``core.types``, so that every part may import them."""
     found = set()
-    for node in ast.walk(ast.parse(Path(_files.__file__).read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom | ast.Import):
-            found |= {node.module} if isinstance(node, ast.ImportFrom) else {alias.name for alias in node.names}
-    assert {name for name in found if name.split(".")[0] not in sys.stdlib_module_names} == {"hippodrome.core.types"}
+    for module in (_files, _folders):
+        for node in ast.walk(ast.parse(Path(module.__file__).read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom | ast.Import):
+                found |= {node.module} if isinstance(node, ast.ImportFrom) else {alias.name for alias in node.names}
+    beneath = {"hippodrome.core.types", "hippodrome._folders"}
+    assert {name for name in found if name.split(".")[0] not in sys.stdlib_module_names} == beneath

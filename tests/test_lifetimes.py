@@ -69,6 +69,11 @@ def wait_until(condition, limit_s=5.0):
     return condition()
 
 
+def hearing_all_signals():
+    """Whoever starts the tests with nohup has them ignore SIGHUP, and with them all that they start."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 @pytest.fixture
 def started(tmp_path):
     """Starts a Python script of the text given, in a session and a folder for temporary files of its own."""
@@ -79,8 +84,10 @@ def started(tmp_path):
         script = tmp_path / "script.py"
         script.write_text(text)
         environment = {**os.environ, "TMPDIR": str(tmp_path / "tmp")}
-        process = subprocess.Popen([sys.executable, str(script), *map(str, arguments)], stdout=subprocess.PIPE, env=environment,
-                                   stderr=subprocess.PIPE, text=True, start_new_session=True)  # fmt: skip
+        process = subprocess.Popen(
+            [sys.executable, str(script), *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            env=environment, start_new_session=True, preexec_fn=hearing_all_signals,
+        )  # fmt: skip
         processes.append(process)
         return process
 

@@ -38,7 +38,9 @@ def test_turns_tell_the_offset(seed, offset_s):
     noise = np.random.default_rng(seed).normal(0.0, 0.05, 1200)
     motion = motion_in_other_clock(drive, offset_s)
     motion = Motion(motion.t_s, motion.speed, motion.yaw_rate_radps + noise[: len(motion.t_s)])
-    assert told_offset(turns_of_motion(motion), turns_of_trajectory(drive, "the truth")) == pytest.approx(offset_s, abs=0.05)
+    assert told_offset(turns_of_motion(motion), turns_of_trajectory(drive, "the truth")) == pytest.approx(
+        offset_s, abs=0.2
+    )  # two samples: of 150 drives the worst was off by 0.08 s, the median by 0.005 s
 
 
 def test_what_does_not_tell_is_refused():

@@ -29,7 +29,7 @@ class ConfidenceConfig:
     window: int = 24  # steps (120 m) over which the score is averaged: single corners must not decide
     least_score_nats: float = -1.5  # least mean score of a step, as low as off the network; a right route has -0.1 to -0.4
     least_evidence_nats: float = 8.0  # least evidence of a segment against decoys, which tell what chance achieves
-    certain_samples: int = 100  # samples (500 m), or half of a shorter drive, that a segment needs to be certain by itself
+    certain_samples: int = 100  # samples (500 m), or 4/5 of a shorter drive, that a segment needs to be certain by itself
     least_joined_nats: float = 3.0  # the same of a segment that dead reckoning joins to a certain one
     least_votes: int = 6  # loop closures that concern a segment, from which on they may vote it down
     least_agreeing: float = 0.34  # share of them that must agree with it: 5 of 6 are false once in 600 times if 20 % are
@@ -76,7 +76,7 @@ def match_status(
     status = np.where(gap < config.least_gap_nats, MatchStatus.AMBIGUOUS, MatchStatus.MATCHED)
     status[~explained] = MatchStatus.OFF_NETWORK
     segments = with_evidence(route_segments(route, explained), route, control, config.least_evidence_nats + 1.0)
-    least_samples = min(config.certain_samples, len(gap) // 2)
+    least_samples = min(config.certain_samples, 4 * len(gap) // 5)
     kept = significant_segments(segments, least_samples, config.least_evidence_nats, config.least_joined_nats, start_known)
     if closures is not None:
         kept = consistent_with_closures(kept, route, closures, config.distant_m, config.least_votes, config.least_agreeing)

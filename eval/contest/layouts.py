@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO, Final
@@ -63,7 +64,7 @@ def write_sequence(observations: Iterable[Observation], given: Given, layout: La
     return times_s
 
 
-class _Frames:
+class _Frames(ABC):
     """Frames written one by one, and a list of them."""
 
     def __init__(self, folder: Path) -> None:
@@ -88,8 +89,9 @@ class _Frames:
     def motion(self, one: Observation) -> None:
         """Speed and yaw rate, for the layouts that have them beside the frames; ``odometry.csv`` has them for all."""
 
+    @abstractmethod
     def add(self, t_s: float, frame: Frame) -> None:
-        raise NotImplementedError
+        """Write the frame that was taken at ``t_s``, and list it."""
 
 
 class _Tum(_Frames):

@@ -86,7 +86,7 @@ class _Frames(ABC):
         self._open.append(stream)
         return stream
 
-    def motion(self, one: Observation) -> None:
+    def motion(self, one: Observation) -> None:  # noqa: B027 - most layouts have nothing to add
         """Speed and yaw rate, for the layouts that have them beside the frames; ``odometry.csv`` has them for all."""
 
     @abstractmethod
@@ -143,7 +143,7 @@ class _Bag(_Frames):
     def __exit__(self, *_: object) -> None:
         self._bag.__exit__()
 
-    def motion(self, one: Observation) -> None:
+    def motion(self, one: Observation) -> None:  # noqa: B027 - most layouts have nothing to add
         self._bag.motion(one)
 
     def add(self, t_s: float, frame: Frame) -> None:

@@ -143,7 +143,7 @@ class _Bag(_Frames):
     def __exit__(self, *_: object) -> None:
         self._bag.__exit__()
 
-    def motion(self, one: Observation) -> None:  # noqa: B027 - most layouts have nothing to add
+    def motion(self, one: Observation) -> None:
         self._bag.motion(one)
 
     def add(self, t_s: float, frame: Frame) -> None:

@@ -29,6 +29,8 @@ BRAIN_PARTS = (  # equations are those of Li et al. 2025
 )  # fmt: skip
 MODULES = 3  # sheets that there is room for; a belief with fewer hides the others
 
+CARD_WORDS = "plain dot: the car; blue: its map as it grows, then laid on the roads; then a second drive finds itself in it"
+
 
 def player(files: ScenarioFiles) -> Html | None:
     """The player of one town; None without ``map.json``. It reads the map that stands further down in the same section."""
@@ -67,7 +69,10 @@ def towns(results: Results, found: Sequence[ScenarioFiles]) -> Html | None:
     if not cards:
         return None
     button = element("button", "▶ Play all", type="button", class_="play-all", aria_pressed="false")
-    return element("div", element("div", cards, class_="town-cards"), element("div", button, class_="transport"), class_="towns")
+    words = element("small", CARD_WORDS, class_="soft")
+    return element(
+        "div", element("div", cards, class_="town-cards"), element("div", button, words, class_="transport"), class_="towns"
+    )
 
 
 def _card(place: int, scenario: ScenarioResult) -> Html:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import math
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -12,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from hippodrome._files import replacing
+from hippodrome._folders import temporary_folder
 from hippodrome.core.types import FloatArray, HippodromeError
 from hippodrome.sim.georeference import GeoReferenceError, read_georeference
 from hippodrome.sim.sumo_tools import PACKED, run_tool, without_comma
@@ -72,8 +72,8 @@ def cut_network(source: Path, net_file: Path, around: Around) -> None:
     angle = _angles()
     middle = _middle_m(source, around)
     corners = middle + around.radius_m * np.stack([np.sin(angle), np.cos(angle)], axis=1)
-    with tempfile.TemporaryDirectory() as folder, without_comma(source) as named:
-        made = Path(folder) / "made.net.xml"
+    with temporary_folder() as folder, without_comma(source) as named:
+        made = folder / "made.net.xml"
         size = source.stat().st_size
         try:
             run_tool(

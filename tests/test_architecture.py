@@ -34,6 +34,8 @@ CORE_ROOMS = {
     "refinement": {"matching", "matching/hmm", "matching/search", "roads", "solvers"},
     "localization/beliefs": {"attractors", "roads"},
     "localization": {"localization/beliefs", "roads", "views"},
+    "reading": set(),
+    "navigation": {"localization", "localization/beliefs", "reading", "roads", "views"},
 }
 # The rooms of eval from the lowest to the highest: each may import only those before it.
 EVAL_ROOMS = (
@@ -132,3 +134,9 @@ def test_the_tables_name_every_room():
         files = [path for path in (ROOT / part).rglob("*.py") if path.name != "__init__.py"]
         found = {room_of(f"hippodrome.{'.'.join(path.relative_to(ROOT).with_suffix('').parts)}")[1] for path in files}
         assert found == rooms
+
+
+def test_temporary_folders_are_those_that_the_next_command_sweeps():
+    """A killed process cannot take its folders away; only those of ``_folders`` are found again."""
+    own = [path for part in MAY_IMPORT for path in (ROOT / part).rglob("*.py")]
+    assert own and not [path for path in own if "TemporaryDirectory" in (text := path.read_text()) or "mkdtemp" in text]

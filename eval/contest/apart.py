@@ -11,7 +11,6 @@ import pickle
 import select
 import struct
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -19,6 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+from hippodrome._folders import temporary_folder
 from hippodrome.core.types import FloatArray, Frame, Observation
 from hippodrome.eval.contest.guard import Crashed
 from hippodrome.eval.contest.process import POLL_S, Limits, Process, started
@@ -104,7 +104,7 @@ class Apart:
 
     def _begin(self) -> Process:
         self._stack = ExitStack()
-        folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
+        folder = self._stack.enter_context(temporary_folder())
         command = [sys.executable, "-m", CHILD]
         self._process = self._stack.enter_context(started(command, folder, self._limits, fed=True))
         self._send(self._process, pickle.dumps(self._made, pickle.HIGHEST_PROTOCOL))

@@ -5,7 +5,6 @@ A method that raises, crashes or answers with no answer has a row that says so, 
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
@@ -14,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from hippodrome._folders import temporary_folder
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
 from hippodrome.eval.contest.calls import Drawn, draw_all, localize
@@ -50,7 +50,7 @@ def perform(materials: Materials, entries: Sequence[Entry]) -> Performance:
         HippodromeError: There is no semi-metric map, and no method beside ours.
     """
     with ExitStack() as stack:
-        folders = {entry.method.key: Path(stack.enter_context(tempfile.TemporaryDirectory())) for entry in entries}
+        folders = {entry.method.key: stack.enter_context(temporary_folder()) for entry in entries}
         for entry in entries:
             stack.callback(entry.close)
         drawn = draw_all(materials, entries, folders)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from hippodrome._folders import temporary_folder
 from hippodrome.core.types import HippodromeError, Trajectory
 from hippodrome.eval.contest.calls import Drawn, draw_all, localize
 from hippodrome.eval.contest.entry import Entry, entries_of
@@ -54,7 +54,7 @@ def localizer_of(entry: Entry, materials: Materials) -> Iterator[Localizer]:
     """A method that localizes, once it has mapped the mapping drive. Raises HippodromeError if it has no map."""
     needed = with_bases(entry, entries_of(materials.scenario))
     with ExitStack() as stack:
-        folders = {one.method.key: Path(stack.enter_context(tempfile.TemporaryDirectory())) for one in needed}
+        folders = {one.method.key: stack.enter_context(temporary_folder()) for one in needed}
         for one in needed:
             stack.callback(one.close)
         drawn = draw_all(materials, needed, folders)[entry.method.key]
@@ -67,7 +67,7 @@ def map_alone(entry: Entry, materials: Materials) -> tuple[Trajectory, float]:
     """A method's trajectory of the mapping drive at the scored times, and the CPU seconds it took. Raises HippodromeError."""
     needed = with_bases(entry, entries_of(materials.scenario))
     with ExitStack() as stack:
-        folders = {one.method.key: Path(stack.enter_context(tempfile.TemporaryDirectory())) for one in needed}
+        folders = {one.method.key: stack.enter_context(temporary_folder()) for one in needed}
         for one in needed:
             stack.callback(one.close)
         drawn = draw_all(materials, needed, folders)[entry.method.key]

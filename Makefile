@@ -46,8 +46,8 @@ paper: setup  ## the paper's drive: 1,315 s, 14,717 frames, about 7.2 km
 baselines: setup  ## the paper's drive with its rivals, binocular ORB-SLAM3 among them, in out/baselines
 	@$(BIN)/hippodrome baselines scenarios/paper.yaml --workers $(WORKERS) --out out/baselines
 
-test: setup  ## the whole test suite, on real SUMO and real GL
-	@$(BIN)/python -m pytest tests
+test: setup  ## the whole test suite, on real SUMO and real GL, in WORKERS processes
+	@$(BIN)/python -m pytest tests --numprocesses $(WORKERS) --dist loadfile
 
 fuzz: setup  ## break the inputs of all readers: CASES of them with SEED, for at most SECONDS
 	@$(BIN)/python -m tests.broken --cases $(CASES) --seed $(SEED) --seconds $(SECONDS)

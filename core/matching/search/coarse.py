@@ -10,13 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from hippodrome.core.matching.search.beam import backward
+from hippodrome.core.matching.search.backward import backward
 from hippodrome.core.matching.search.config import RouteSearchConfig, SearchCosts
 from hippodrome.core.matching.search.hypotheses import HYPOTHESIS, NOWHERE, PLACE, Hypotheses
 from hippodrome.core.matching.search.model import Drive, SearchModel
 from hippodrome.core.matching.search.passes import forward_pass
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, compiled_drive, compiled_model
-from hippodrome.core.roads.lane_graph import LaneGraph, build_lane_graph
+from hippodrome.core.roads.lanes_ahead import SearchGraph, build_search_graph
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import Float32Array, FloatArray, IntArray
 
@@ -94,7 +94,7 @@ def _fine_states(
     return hypotheses[hypotheses["score_nats"] > NOWHERE]
 
 
-def hypotheses_in(graph: LaneGraph, bins: IntArray, scales: int, heading_rad: float) -> Hypotheses:
+def hypotheses_in(graph: SearchGraph, bins: IntArray, scales: int, heading_rad: float) -> Hypotheses:
     """Hypotheses for every scale bin in each of the bins, bin by bin.
 
     Each is headed along its lane while odometry says ``heading_rad``; the difference is its heading offset.
@@ -119,7 +119,7 @@ def _coarse_problem(problem: SearchProblem, config: RouteSearchConfig) -> Search
         problem,
         track=replace(problem.track, step=step),
         log_scale=log_scale,
-        graph=build_lane_graph(problem.network, reach_m, factor * config.bin_m),
+        graph=build_search_graph(problem.network, reach_m, factor * config.bin_m),
         costs=_coarse_costs(config),
         off_network=replace(config.off_network, leave_nats=1e9),  # the start is sought on the network only
         bin_m=factor * config.bin_m,
@@ -133,7 +133,7 @@ def _coarse_costs(config: RouteSearchConfig) -> SearchCosts:
     )
 
 
-def _coarse_bin_of_lane(fine: LaneGraph, coarse: LaneGraph) -> IntArray:
+def _coarse_bin_of_lane(fine: SearchGraph, coarse: SearchGraph) -> IntArray:
     """The coarse bin (N,) in which each fine bin lies, counted from the beginning of its lane."""
     counts = np.diff(fine.lane_start)[fine.lane]
     order = np.arange(fine.bin_count) - fine.lane_start[fine.lane]

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hippodrome.core.matching.search.beam import Alternatives, BeamLimits, Survivors, alternatives, backward, forward
+from hippodrome.core.matching.search.backward import Alternatives, alternatives, backward
+from hippodrome.core.matching.search.beam import BeamLimits, Survivors, forward
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.hypotheses import NOWHERE, Hypotheses
 from hippodrome.core.matching.search.model import Drive, SearchModel
@@ -60,8 +61,7 @@ def forward_pass(
         least_nats: a hypothesis with a lower score is dropped, however good the others are.
     """
     limits = BeamLimits(beam_nats, most, enough, max(_MAX_ROWS, 4 * len(initial.hypotheses)), least_nats)
-    survivors: Survivors = forward(drive, model, limits, *initial)
-    return survivors
+    return forward(drive, model, limits, *initial)
 
 
 def most_likely_route(

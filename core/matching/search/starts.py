@@ -12,19 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hippodrome.core.matching.search.beam import backward
+from hippodrome.core.matching.search.backward import backward
 from hippodrome.core.matching.search.coarse import good_states, hypotheses_in
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.hypotheses import HYPOTHESIS, NOWHERE, PLACE, Hypotheses
 from hippodrome.core.matching.search.passes import forward_pass, last_survivors
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, compiled_drive, compiled_model
 from hippodrome.core.matching.search.track import Track
-from hippodrome.core.roads.lane_graph import (
-    LaneGraph,
-    build_lane_graph,
-    mirrored,
-    reversed_network,
-)
+from hippodrome.core.roads.lane_graph import mirrored, reversed_network
+from hippodrome.core.roads.lanes_ahead import SearchGraph, build_search_graph
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import Float32Array, StartPose
 
@@ -87,7 +83,7 @@ def starts_near_pose(problem: SearchProblem, start: StartPose, config: RouteSear
     return InitialHypotheses(np.concatenate([on_network, off]), places)
 
 
-def _prior_nats(graph: LaneGraph, start: StartPose) -> Float32Array:
+def _prior_nats(graph: SearchGraph, start: StartPose) -> Float32Array:
     """Log prior (N,) of beginning in each bin, up to a constant: normal in the place and in the heading."""
     away = np.hypot(graph.points_m[:, 0] - start.x_m, graph.points_m[:, 1] - start.y_m) / start.sigma_m
     turned = wrap(graph.heading_rad.astype(np.float64) - start.heading_rad) / start.sigma_rad
@@ -126,7 +122,7 @@ def _traced_to_beginning(
     It runs on the reversed network, where lanes are driven from their end to their beginning and all headings are turned by pi.
     """
     network = reversed_network(problem.network)
-    graph = build_lane_graph(network, problem.graph.reach_limit_m, problem.bin_m)
+    graph = build_search_graph(network, problem.graph.reach_limit_m, problem.bin_m)
     backwards = replace(problem, network=network, graph=graph)
     drive = compiled_drive(backwards, problem.track.heading_rad[anchor::-1] + np.pi)
     initial = InitialHypotheses(_time_reversed(problem.graph, hypotheses), _NO_PLACES)
@@ -138,7 +134,7 @@ def _traced_to_beginning(
     return InitialHypotheses(first, places)
 
 
-def _time_reversed(graph: LaneGraph, hypotheses: Hypotheses) -> Hypotheses:
+def _time_reversed(graph: SearchGraph, hypotheses: Hypotheses) -> Hypotheses:
     """Convert hypotheses between a lane graph and that of the reversed network: the same places, with time running backwards.
 
     Bins are counted from the other end of their lane, and the driven length beyond a bin's centre changes its sign.

@@ -19,7 +19,7 @@ from hippodrome.core.matching.search.model import Drive, SearchModel, StepObserv
 from hippodrome.core.matching.search.off_network import MOST_OFF, StepRows, step_off_network
 from hippodrome.core.matching.search.states import Scratch, empty_states, forget_states, make_scratch, state_of
 from hippodrome.core.matching.search.successors import MOST_SUCCESSORS, jump_bar, successors
-from hippodrome.core.types import IntArray
+from hippodrome.core.types import FloatArray, IntArray
 
 
 class BeamLimits(NamedTuple):
@@ -29,7 +29,7 @@ class BeamLimits(NamedTuple):
     most_survivors: int  # about how many may survive a step
     enough_survivors: int  # the pass ends early once no more than these are left
     most_rows: int  # the pass ends early once this many hypotheses have survived, all steps together
-    least_nats: float  # a hypothesis with a lower score is dropped, however good the others are
+    least_nats: FloatArray  # (T,) a hypothesis with a lower score at its sample is dropped, however good the others are
 
 
 class Survivors(NamedTuple):
@@ -71,7 +71,7 @@ def _forward(
         size, place_count, best = step_off_network(
             rows, places, filled, best, limits.beam_nats, observation, model, scratch.index_of_lane
         )
-        least_nats = max(best - limits.beam_nats, limits.least_nats)
+        least_nats = max(best - limits.beam_nats, limits.least_nats[t])
         row_start[t + 1] = end + _keep_best(rows[end:size], least_nats, limits.most_survivors)
         if row_start[t + 1] - end <= limits.enough_survivors or row_start[t + 1] >= limits.most_rows:
             died_out = row_start[t + 1] == end

@@ -113,7 +113,7 @@ def test_max_marginals_are_the_scores_of_complete_routes():
     bent = problem(headings=(0.0, 0.1, 0.3, 0.5))
     drive, model = compiled_drive(bent, bent.track.heading_rad), compiled_model(bent)
     initial = np.concatenate([hypothesis(bin=0), hypothesis(bin=2, score_nats=-0.3)])
-    survivors = forward(drive, model, BeamLimits(1e3, 10_000, 0, 1_000_000, NOWHERE), initial, np.empty(0, PLACE))
+    survivors = forward(drive, model, BeamLimits(1e3, 10_000, 0, 1_000_000, np.full(4, NOWHERE)), initial, np.empty(0, PLACE))
     row_start, rows = survivors.row_start, survivors.hypotheses
     last = rows["score_nats"][row_start[-2] :]
     through = backward(drive, model, 1e3, survivors, np.zeros(len(last), np.float32))

@@ -128,7 +128,7 @@ def offer(kind: str, keyframes: int, visits: Visits, network: RoadNetwork, poses
         route = most_likely_drive(problem, config)
     except HippodromeError:  # no route is as long as the drive: refused
         return Offer(kind, keyframes, 0.0, 0.0, time.process_time() - began, ())
-    control = control_of(problem, config)
+    control = control_of(problem, config, route)
     vouched = match_status(route, control, confidence) == MatchStatus.MATCHED
     seconds = time.process_time() - began
     right = np.zeros(len(vouched), dtype=bool)

@@ -19,7 +19,9 @@ from typing import TypeAlias
 
 import numpy as np
 
+from hippodrome.core.matching.search.coarse import CoarseStates, coarse_problem
 from hippodrome.core.matching.search.config import RouteSearchConfig
+from hippodrome.core.matching.search.floor import Floor
 from hippodrome.core.matching.search.hypotheses import NOWHERE
 from hippodrome.core.matching.search.passes import best_nats
 from hippodrome.core.matching.search.problem import SearchProblem
@@ -31,28 +33,49 @@ Control: TypeAlias = Callable[[int, int, float], float]  # first and end sample,
 
 FACTOR = 2.0  # chance must cost at least this many times what the route costs: wrong ones cost 0.6 to 1.6 times as much
 _WINDOW = 120  # steps (600 m) around the most turning that are tried first: a right route has proved itself there nearly always
+_MOST_BINS = 25_000  # coarse bins (100 km of lanes) around a part that its decoys may begin in
+_LOG_SCALE = 0.4  # most that the log scale at which a decoy begins differs from that of the part
 _GOOD_STEP_NATS = 0.5  # mean cost of a step up to which a longer part is tried: a right route has 0.1-0.3, chance about 1
 _LEAST_TURN_RAD = 0.7  # less turning than half a crossing fits everywhere, to the left as to the right
 
 
-def control_of(problem: SearchProblem, config: RouteSearchConfig) -> Control:
-    """The control for the parts of one drive."""
-    return partial(decoy_nats, problem, config)
+def control_of(problem: SearchProblem, config: RouteSearchConfig, route: Route) -> Control:
+    """The control for the parts of one drive and its route."""
+    return partial(decoy_nats, problem, coarse_problem(problem, config), config, route)
 
 
-def decoy_nats(problem: SearchProblem, config: RouteSearchConfig, first: int, end: int, least_nats: float) -> float:
+def decoy_nats(
+    problem: SearchProblem,
+    coarse: SearchProblem,
+    config: RouteSearchConfig,
+    route: Route,
+    first: int,
+    end: int,
+    least_nats: float,
+) -> float:
     """Log likelihood of the best route of a decoy of the samples ``first`` to ``end - 1`` of the drive, from an unknown start.
 
-    It is that of the better explained one of two decoys, or -inf if both are below ``least_nats``; the search ends as soon as
-    that is certain.
+    It is that of the better explained one of two decoys, or -inf if both stay below ``least_nats``; the search ends as soon as
+    that is so.
     """
-    best = NOWHERE
+    best, among = NOWHERE, _around(coarse, route, first, end)
     for make_decoy in (mirrored_part, reversed_part):
         decoy = replace(problem, track=make_decoy(problem.track, first, end))
-        floor = max(best, least_nats)
-        start = starts_without_prior(decoy, anchor_samples(decoy.track, 1)[0], config, floor)
+        floor = Floor.over(decoy.track, max(best, least_nats))
+        start = starts_without_prior(decoy, coarse, anchor_samples(decoy.track, 1)[0], config, floor, among)
         best = max(best, best_nats(decoy, start.initial, config, floor))
     return best
+
+
+def _around(coarse: SearchProblem, route: Route, first: int, end: int) -> CoarseStates:
+    """The coarse states in which decoys of a part of the route begin: in its surroundings, at about its scale.
+
+    Chance has as much to choose from there as elsewhere, so that a country need not be searched for what a town tells.
+    """
+    away = np.hypot(*(coarse.graph.points_m - route.points_m[first:end].mean(axis=0)).T)
+    bins = np.sort(np.argpartition(away, _MOST_BINS)[:_MOST_BINS]) if len(away) > _MOST_BINS else np.arange(len(away))
+    off = np.abs(coarse.log_scale - np.median(route.log_scale[first:end]))
+    return CoarseStates(bins.astype(np.int32), np.flatnonzero(off <= max(_LOG_SCALE, off.min())).astype(np.int32))
 
 
 def mirrored_part(track: Track, first: int, end: int) -> Track:

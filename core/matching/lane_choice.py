@@ -16,7 +16,7 @@ from hippodrome.core.matching.search.problem import SearchProblem
 from hippodrome.core.matching.search.route import Route, best_route
 from hippodrome.core.matching.search.starts import starts_near_pose
 from hippodrome.core.matching.search.track import Track
-from hippodrome.core.roads.lane_graph import build_lane_graph
+from hippodrome.core.roads.lanes_ahead import build_search_graph
 from hippodrome.core.roads.network import BoolArray, RoadNetwork
 from hippodrome.core.types import FloatArray, StartPose
 
@@ -73,7 +73,7 @@ def choose_lanes(poses: FloatArray, matched: BoolArray, network: RoadNetwork, co
     track = Track(samples, np.interp(samples, arc, np.unwrap(poses[:, 2])), arc, config.step_m)
     log_scale = config.scale_bin * np.arange(-1.0, 2.0)  # lengths along lanes differ a little from those of the poses
     reach_m = config.step_m * float(np.exp(log_scale[-1])) + 4.0 * config.bin_m
-    graph = build_lane_graph(network, reach_m, config.bin_m)
+    graph = build_search_graph(network, reach_m, config.bin_m)
     costs = replace(config.costs, scale_step_nats=_SCALE_STEP_NATS)
     problem = SearchProblem(network, track, log_scale, graph, costs, config.off_network, config.bin_m)
     between_matched = np.interp(samples, arc, matched.astype(np.float64)) >= 1.0

@@ -58,7 +58,7 @@ def refine_route(
     visits, closures = cognitive_map.visits, keyframe_closures(cognitive_map)
     problem = search_problem(visits, network, config.search)
     route = most_likely_drive(problem, config.search, start)
-    control = control_of(problem, config.search)
+    control = control_of(problem, config.search, route)
     status = match_status(route, control, config.confidence, closures, start is not None)[route.track.visit_samples()]
     vouched = (status != MatchStatus.OFF_NETWORK).astype(np.float64)
     log_scale = np.interp(route.track.visit_arc, route.track.arc, route.log_scale)

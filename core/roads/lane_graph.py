@@ -33,26 +33,48 @@ _OPEN_LANE = np.dtype(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LaneGraph:
-    """N bins, lane after lane, and what is within reach of each.
-
-    The bins ahead of bin ``i`` are rows ``reach_start[i]:reach_start[i + 1]`` of the reach table, the nearest one first.
-    """
+class LaneBins:
+    """All lanes cut into N bins, lane after lane."""
 
     lane: IntArray  # (N,) lane of each bin
     position_m: FloatArray  # (N,) arc length of the bin's centre on its lane
     points_m: FloatArray  # (N, 2) the bin's centre
     heading_rad: Float32Array  # (N,) driving direction at the centre
     lane_start: IntArray  # (L + 1,) first bin of each lane
+
+    @property
+    def bin_count(self) -> int:
+        return len(self.lane)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaneGraph(LaneBins):
+    """N bins, and what is within reach of each.
+
+    The bins ahead of bin ``i`` are rows ``reach_start[i]:reach_start[i + 1]`` of the reach table, the nearest one first.
+    """
+
     reach_start: np.ndarray[tuple[int], np.dtype[np.int64]]  # (N + 1,)
     reach_bin: IntArray  # (R,) a bin ahead
     reach_m: Float32Array  # (R,) arc length from bin centre to bin centre
     reach_changes: UInt8Array  # (R,) lane changes on the way, 0 or 1
     reach_limit_m: float  # how far ahead the table goes
 
-    @property
-    def bin_count(self) -> int:
-        return len(self.lane)
+
+def cut_lanes(network: RoadNetwork, bin_m: float) -> LaneBins:
+    """Cut every lane into equal bins of at most ``bin_m``."""
+    lengths = network.lane_lengths_m()
+    counts = np.maximum(1, np.ceil(lengths / bin_m - 1e-9)).astype(np.int32)
+    lane_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    lane, number = number_pieces(counts)
+    position = (number + 0.5) * (lengths / counts)[lane]
+    return LaneBins(
+        lane=lane,
+        position_m=position,
+        points_m=points_between_vertices(network, lane, position),
+        heading_rad=chord_headings(network, lane, position, _HALF_CHORD_M).astype(np.float32),
+        lane_start=lane_start,
+    )
 
 
 def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 1.0) -> LaneGraph:
@@ -60,19 +82,15 @@ def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 
 
     A drive may begin with a change to an adjacent lane; it keeps to that lane from there on.
     """
-    lengths = network.lane_lengths_m()
-    counts = np.maximum(1, np.ceil(lengths / bin_m - 1e-9)).astype(np.int32)
-    lane_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    lane, number = number_pieces(counts)
-    position = (number + 0.5) * (lengths / counts)[lane]
-    lanes = _Lanes(lengths, network.successor, network.successor_start, network.left_lane, network.right_lane)
-    table = _reach_table(_Bins(lane, position, lane_start), lanes, float(reach_limit_m))
+    bins = cut_lanes(network, bin_m)
+    lanes = _Lanes(network.lane_lengths_m(), network.successor, network.successor_start, network.left_lane, network.right_lane)
+    table = _reach_table(_Bins(bins.lane, bins.position_m, bins.lane_start), lanes, float(reach_limit_m))
     return LaneGraph(
-        lane=lane,
-        position_m=position,
-        points_m=points_between_vertices(network, lane, position),
-        heading_rad=chord_headings(network, lane, position, _HALF_CHORD_M).astype(np.float32),
-        lane_start=lane_start,
+        lane=bins.lane,
+        position_m=bins.position_m,
+        points_m=bins.points_m,
+        heading_rad=bins.heading_rad,
+        lane_start=bins.lane_start,
         reach_start=table.start,
         reach_bin=table.ahead.bin,
         reach_m=table.ahead.distance_m,
@@ -99,7 +117,7 @@ def reversed_network(network: RoadNetwork) -> RoadNetwork:
     )
 
 
-def mirrored(graph: LaneGraph, bins: IntArray) -> IntArray:
+def mirrored(graph: LaneBins, bins: IntArray) -> IntArray:
     """Numbers (K,) of the bins of the reversed network's graph that cover the same places as ``bins`` (K,) of this ``graph``.
 
     A search that runs back in time uses that graph. It has the bins of each lane in reverse order. Negative numbers, which mean
@@ -123,7 +141,7 @@ class BinGrid(NamedTuple):
     rows: int
 
 
-def bin_grid(graph: LaneGraph, cell_m: float = 10.0) -> BinGrid:
+def bin_grid(graph: LaneBins, cell_m: float = 10.0) -> BinGrid:
     """Sort the bins into square cells, as a spatial index.
 
     If ``cell_m`` is about the radius of a search, the search reads about 9 cells.

@@ -7,16 +7,18 @@ A large network is searched in parts, so that memory does not grow with it; the 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from hippodrome.core.matching.search.beam import backward
+from hippodrome.core.matching.search.backward import backward
 from hippodrome.core.matching.search.config import RouteSearchConfig, SearchCosts
+from hippodrome.core.matching.search.floor import Floor
 from hippodrome.core.matching.search.hypotheses import HYPOTHESIS, NOWHERE, PLACE, Hypotheses
 from hippodrome.core.matching.search.model import Drive, SearchModel
 from hippodrome.core.matching.search.passes import forward_pass
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, compiled_drive, compiled_model
-from hippodrome.core.roads.lane_graph import LaneGraph, build_lane_graph
+from hippodrome.core.roads.lanes_ahead import SearchGraph, build_search_graph
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import Float32Array, FloatArray, IntArray
 
@@ -26,53 +28,83 @@ _STEPS = 60  # coarse steps (600 m) over which the states of a network in severa
 _MOST_FINE = 200_000  # fine states that are handed on, the best rated ones
 
 
-def good_states(problem: SearchProblem, anchor: int, config: RouteSearchConfig, least_nats: float) -> Hypotheses:
+class CoarseStates(NamedTuple):
+    """The coarse states in which a search may begin: all of these scale bins in all of these bins."""
+
+    bins: IntArray  # ascending
+    scale_bins: IntArray  # ascending
+
+    @classmethod
+    def everywhere(cls, coarse: SearchProblem) -> Self:
+        return cls(np.arange(coarse.graph.bin_count, dtype=np.int32), np.arange(len(coarse.log_scale), dtype=np.int32))
+
+
+def good_states(
+    problem: SearchProblem, coarse: SearchProblem, anchor: int, config: RouteSearchConfig, floor: Floor | None = None,
+    among: CoarseStates | None = None,
+) -> Hypotheses:  # fmt: skip
     """The fine states that may be the right one at sample ``anchor``, with their ratings as scores.
 
     The rating is the score of the best coarse route that begins in the state, less that of the best of all; states more than
-    ``seed_margin_nats`` behind are left out, and all of them if no route scores ``least_nats``. All fine states within one
-    coarse state have the same rating.
+    ``seed_margin_nats`` behind are left out, and all of them if all routes stay below the floor. All fine states within one
+    coarse state have the same rating. Only coarse states ``among`` those given are tried, or all.
     """
-    coarse = _coarse_problem(problem, config)
-    states, nats = _rated_states(coarse, problem.track.heading_rad[anchor::2], config, least_nats)
+    heading_rad = problem.track.heading_rad[anchor::2]  # the steps of the coarse search are twice as long as those of the drive
+    least_nats = np.full(len(heading_rad), NOWHERE) if floor is None else floor.from_sample(anchor, 2)
+    tried = CoarseStates.everywhere(coarse) if among is None else among
+    states, nats = _rated_states(coarse, heading_rad, config, least_nats, tried)
     return _fine_states(problem, coarse, states, nats, float(problem.track.heading_rad[anchor]), config.coarse)
 
 
 def _rated_states(
-    coarse: SearchProblem, heading_rad: FloatArray, config: RouteSearchConfig, least_nats: float
+    coarse: SearchProblem, heading_rad: FloatArray, config: RouteSearchConfig, least_nats: FloatArray, tried: CoarseStates
 ) -> tuple[IntArray, Float32Array]:
-    """Numbers (n,) of the good coarse states, bin by bin, and their ratings (n,)."""
-    scales = len(coarse.log_scale)
-    bins_at_once = max(_MOST_STATES // scales, 1)
-    parts = range(0, coarse.graph.bin_count, bins_at_once)
+    """Numbers (n,) of the good coarse states, and their ratings (n,).
+
+    What a part of the network scores at each sample prunes the parts after it, as if all were searched at once.
+    """
+    bins_at_once = max(_MOST_STATES // len(tried.scale_bins), 1)
+    parts = range(0, len(tried.bins), bins_at_once)
     alone = len(parts) == 1
-    # the steps of the coarse search are twice as long as those of the drive, so that the caller takes every second sample
-    drive = compiled_drive(coarse, heading_rad if alone else heading_rad[: _STEPS + 1])
-    model, floor, found = compiled_model(coarse), least_nats, []
+    samples = len(heading_rad) if alone else min(_STEPS + 1, len(heading_rad))
+    drive, model, least_nats = compiled_drive(coarse, heading_rad[:samples]), compiled_model(coarse), least_nats[:samples].copy()
+    found: list[_Rated] = []
     for first in parts:
-        bins = np.arange(first, min(first + bins_at_once, coarse.graph.bin_count), dtype=np.int32)
-        initial = hypotheses_in(coarse.graph, bins, scales, float(heading_rad[0]))
-        rated, best = _rated_part(drive, model, initial, config, floor, config.coarse_enough if alone else 0)
-        found.append((first * scales + rated[0], rated[1]))
-        floor = max(floor, best - config.seed_margin_nats)
-    states, nats = (np.concatenate(column) for column in zip(*found, strict=True))
+        initial = hypotheses_in(coarse.graph, tried.bins[first : first + bins_at_once], tried.scale_bins, float(heading_rad[0]))
+        found.append(_rated_part(drive, model, initial, config, least_nats, config.coarse_enough if alone else 0))
+        best = found[-1].best_nats
+        least_nats[: len(best)] = np.maximum(least_nats[: len(best)], best - config.coarse_beam_nats)
+        if len(best) == samples:
+            least_nats[-1] = max(least_nats[-1], best[-1] - config.seed_margin_nats)
+    longest = max(len(part.best_nats) for part in found)
+    states, nats = (np.concatenate([part[i] for part in found if len(part.best_nats) == longest]) for i in range(2))
     good = nats >= nats.max(initial=NOWHERE) - config.seed_margin_nats
     return states[good], nats[good] - nats.max(initial=NOWHERE)
 
 
+class _Rated(NamedTuple):
+    """The good ones among some initial states."""
+
+    states: IntArray  # (n,) their numbers
+    nats: Float32Array  # (n,) score of the best route from each
+    best_nats: FloatArray  # (t,) best score at each sample, up to where the search ended
+
+
 def _rated_part(
-    drive: Drive, model: SearchModel, starts: Hypotheses, config: RouteSearchConfig, least_nats: float, enough: int
-) -> tuple[tuple[IntArray, Float32Array], float]:
-    """The good ones among some initial states, each with the score of the best route from it, and the best score."""
+    drive: Drive, model: SearchModel, starts: Hypotheses, config: RouteSearchConfig, least_nats: FloatArray, enough: int
+) -> _Rated:
+    """Search from some initial states, and rate those from which good routes lead on. There are none if all stay too low."""
     initial = InitialHypotheses(starts, np.empty(0, PLACE))
     survivors = forward_pass(drive, model, initial, config.coarse_beam_nats, _MOST_COARSE, enough, least_nats)
-    if survivors.died_out and least_nats > NOWHERE:
-        return (np.empty(0, np.int32), np.empty(0, np.float32)), NOWHERE
-    last = survivors.hypotheses["score_nats"][survivors.row_start[-2] :]
+    if survivors.died_out and np.any(least_nats > NOWHERE):
+        return _Rated(np.empty(0, np.int32), np.empty(0, np.float32), np.empty(0))
+    score = survivors.hypotheses["score_nats"]
+    last = score[survivors.row_start[-2] :]
     through = backward(drive, model, config.seed_margin_nats, survivors, np.zeros(len(last), np.float32))[: len(starts)]
-    good = np.flatnonzero(through > NOWHERE).astype(np.int32)
-    best = float(last.max())
-    return (good, through[good] + np.float32(best)), best
+    good = starts[through > NOWHERE]
+    states = good["bin"] * np.int32(len(model.scales)) + good["scale_bin"]
+    best = np.maximum.reduceat(score, survivors.row_start[:-1]).astype(np.float64)
+    return _Rated(states, through[through > NOWHERE] + np.float32(best[-1]), best)
 
 
 def _fine_states(
@@ -89,24 +121,25 @@ def _fine_states(
     coarse_bin = coarse.graph.lane_start[problem.graph.lane] + _coarse_bin_of_lane(problem.graph, coarse.graph)
     bins = np.flatnonzero(rating.max(axis=1)[coarse_bin] > NOWHERE).astype(np.int32)
     coarse_scale = np.minimum(np.arange(fine_scales) // factor, scales - 1)
-    hypotheses = hypotheses_in(problem.graph, bins, fine_scales, heading_rad)
+    hypotheses = hypotheses_in(problem.graph, bins, np.arange(fine_scales, dtype=np.int32), heading_rad)
     hypotheses["score_nats"] = rating[coarse_bin[bins]][:, coarse_scale].ravel()
     return hypotheses[hypotheses["score_nats"] > NOWHERE]
 
 
-def hypotheses_in(graph: LaneGraph, bins: IntArray, scales: int, heading_rad: float) -> Hypotheses:
-    """Hypotheses for every scale bin in each of the bins, bin by bin.
+def hypotheses_in(graph: SearchGraph, bins: IntArray, scale_bins: IntArray, heading_rad: float) -> Hypotheses:
+    """Hypotheses for every one of the scale bins in each of the bins, bin by bin.
 
     Each is headed along its lane while odometry says ``heading_rad``; the difference is its heading offset.
     """
-    rows = np.zeros(len(bins) * scales, HYPOTHESIS)
-    rows["bin"] = np.repeat(bins, scales)
-    rows["scale_bin"] = np.tile(np.arange(scales, dtype=np.int32), len(bins))
-    rows["heading_offset_rad"] = np.repeat(wrap(graph.heading_rad[bins].astype(np.float64) - heading_rad), scales)
+    rows = np.zeros(len(bins) * len(scale_bins), HYPOTHESIS)
+    rows["bin"] = np.repeat(bins, len(scale_bins))
+    rows["scale_bin"] = np.tile(scale_bins, len(bins))
+    offset = wrap(graph.heading_rad[bins].astype(np.float64) - heading_rad)
+    rows["heading_offset_rad"] = np.repeat(offset, len(scale_bins))
     return rows
 
 
-def _coarse_problem(problem: SearchProblem, config: RouteSearchConfig) -> SearchProblem:
+def coarse_problem(problem: SearchProblem, config: RouteSearchConfig) -> SearchProblem:
     """The same problem with bins and scale bins ``config.coarse`` times as large and steps twice as long.
 
     It has so few states that all of them can be searched.
@@ -119,7 +152,7 @@ def _coarse_problem(problem: SearchProblem, config: RouteSearchConfig) -> Search
         problem,
         track=replace(problem.track, step=step),
         log_scale=log_scale,
-        graph=build_lane_graph(problem.network, reach_m, factor * config.bin_m),
+        graph=build_search_graph(problem.network, reach_m, factor * config.bin_m),
         costs=_coarse_costs(config),
         off_network=replace(config.off_network, leave_nats=1e9),  # the start is sought on the network only
         bin_m=factor * config.bin_m,
@@ -133,7 +166,7 @@ def _coarse_costs(config: RouteSearchConfig) -> SearchCosts:
     )
 
 
-def _coarse_bin_of_lane(fine: LaneGraph, coarse: LaneGraph) -> IntArray:
+def _coarse_bin_of_lane(fine: SearchGraph, coarse: SearchGraph) -> IntArray:
     """The coarse bin (N,) in which each fine bin lies, counted from the beginning of its lane."""
     counts = np.diff(fine.lane_start)[fine.lane]
     order = np.arange(fine.bin_count) - fine.lane_start[fine.lane]

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from hippodrome.core.roads.lane_graph import BinGrid
-from hippodrome.core.types import Float32Array, FloatArray, IntArray, UInt8Array
+from hippodrome.core.roads.lanes_ahead import LanesAhead
+from hippodrome.core.types import Float32Array, FloatArray, IntArray
 
 
 class GraphTables(NamedTuple):
-    """N bins and what lies ahead of each: bin ``i`` owns rows ``reach_start[i]:reach_start[i + 1]``, the nearest bin first."""
+    """N bins of lanes, and the lanes ahead of each lane."""
 
-    reach_start: NDArray[np.int64]  # (N + 1,)
-    reach_bin: IntArray  # (R,) bin ahead
-    reach_m: Float32Array  # (R,) arc length to it, from centre to centre
-    lane_changes: UInt8Array  # (R,) lane changes on the way, 0 or 1
+    ahead: LanesAhead
     heading_rad: Float32Array  # (N,) driving direction in each bin
     lane: IntArray  # (N,) lane of each bin
+    position_m: FloatArray  # (N,) arc length of its centre on the lane
     points_m: FloatArray  # (N, 2) centre of each bin
 
 

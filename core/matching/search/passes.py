@@ -12,8 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hippodrome.core.matching.search.beam import Alternatives, BeamLimits, Survivors, alternatives, backward, forward
+from hippodrome.core.matching.search.backward import Alternatives, alternatives, backward
+from hippodrome.core.matching.search.beam import BeamLimits, Survivors, forward
 from hippodrome.core.matching.search.config import RouteSearchConfig
+from hippodrome.core.matching.search.floor import Floor
 from hippodrome.core.matching.search.hypotheses import NOWHERE, Hypotheses
 from hippodrome.core.matching.search.model import Drive, SearchModel
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, compiled_drive, compiled_model
@@ -44,7 +46,7 @@ class _Section(NamedTuple):
 
 def forward_pass(
     drive: Drive, model: SearchModel, initial: InitialHypotheses, beam_nats: float, most: int, enough: int = 0,
-    least_nats: float = NOWHERE,
+    least_nats: FloatArray | None = None,
 ) -> Survivors:  # fmt: skip
     """Beam search over a drive, or over as much of it as fits into memory.
 
@@ -57,11 +59,11 @@ def forward_pass(
         beam_nats: a hypothesis this far behind the best one of its step is dropped.
         most: about how many hypotheses may survive a step.
         enough: the search may end once no more than these survive a step; with 0 it goes on as long as any do.
-        least_nats: a hypothesis with a lower score is dropped, however good the others are.
+        least_nats: (T,) a hypothesis with a lower score at its sample is dropped, however good the others are; None: none is.
     """
+    least_nats = np.full(len(drive.heading_rad), NOWHERE) if least_nats is None else least_nats
     limits = BeamLimits(beam_nats, most, enough, max(_MAX_ROWS, 4 * len(initial.hypotheses)), least_nats)
-    survivors: Survivors = forward(drive, model, limits, *initial)
-    return survivors
+    return forward(drive, model, limits, *initial)
 
 
 def most_likely_route(
@@ -78,14 +80,13 @@ def most_likely_route(
     return None
 
 
-def best_nats(
-    problem: SearchProblem, initial: InitialHypotheses, config: RouteSearchConfig, least_nats: float = NOWHERE
-) -> float:
+def best_nats(problem: SearchProblem, initial: InitialHypotheses, config: RouteSearchConfig, floor: Floor | None = None) -> float:
     """Log likelihood of the most likely route from the initial hypotheses over the whole drive, without the route itself.
 
-    It is ``NOWHERE`` if no route of the network is as long as the drive, or if it were below ``least_nats``; the search ends as
-    soon as that is certain.
+    It is ``NOWHERE`` if no route of the network is as long as the drive, or if it stays below the floor; the search ends as soon
+    as that is so.
     """
+    least_nats = None if floor is None else floor.from_sample(0)
     drive, model = compiled_drive(problem, problem.track.heading_rad), compiled_model(problem)
     for section, survivors in _sections(drive, model, initial, config, least_nats):
         if section.last == len(drive.heading_rad) - 1:
@@ -94,14 +95,14 @@ def best_nats(
 
 
 def _sections(
-    drive: Drive, model: SearchModel, initial: InitialHypotheses, config: RouteSearchConfig, least_nats: float = NOWHERE
+    drive: Drive, model: SearchModel, initial: InitialHypotheses, config: RouteSearchConfig, least_nats: FloatArray | None = None
 ) -> Iterator[tuple[_Section, Survivors]]:
     """The sections of the forward pass in driving order, each with its survivors, up to where no hypothesis is left."""
     first, score_offset, samples = 0, 0.0, len(drive.heading_rad)
     while len(initial.hypotheses):
         survivors = forward_pass(
             _samples(drive, first, samples), model, initial, config.beam_nats, config.most_survivors,
-            least_nats=least_nats - score_offset,
+            least_nats=None if least_nats is None else least_nats[first:] - score_offset,
         )  # fmt: skip
         last = first + len(survivors.row_start) - 2
         yield _Section(first, last, initial, score_offset), survivors

@@ -17,7 +17,8 @@ from hippodrome.core.matching.search.track import (
     make_track,
     scale_range,
 )
-from hippodrome.core.roads.lane_graph import LaneGraph, bin_grid, build_lane_graph
+from hippodrome.core.roads.lane_graph import bin_grid
+from hippodrome.core.roads.lanes_ahead import SearchGraph, build_search_graph
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, Visits
 
@@ -36,7 +37,7 @@ class SearchProblem:
     network: RoadNetwork
     track: Track
     log_scale: FloatArray  # (K,) centres of the scale bins, ln(metres per map unit), ascending
-    graph: LaneGraph
+    graph: SearchGraph
     costs: SearchCosts
     off_network: OffNetworkCosts
     bin_m: float
@@ -52,7 +53,7 @@ def search_problem(visits: Visits, network: RoadNetwork, config: RouteSearchConf
     low, typical, high = scale_range(visits, network) if known is None else known_scale_range(known)
     log_scale = np.arange(np.log(low), np.log(high) + config.scale_bin, config.scale_bin)
     track = make_track(visits, min(config.step_m / typical, 0.25 * driven_arc(visits)[-1]))
-    graph = build_lane_graph(network, track.step * np.exp(log_scale[-1]) + 4.0 * config.bin_m, config.bin_m)
+    graph = build_search_graph(network, track.step * np.exp(log_scale[-1]) + 4.0 * config.bin_m, config.bin_m)
     return SearchProblem(network, track, log_scale, graph, config.costs, config.off_network, config.bin_m)
 
 
@@ -74,12 +75,10 @@ def compiled_model(problem: SearchProblem) -> SearchModel:
     return SearchModel(
         scales=np.exp(problem.log_scale),
         graph=GraphTables(
-            reach_start=graph.reach_start,
-            reach_bin=graph.reach_bin,
-            reach_m=graph.reach_m,
-            lane_changes=graph.reach_changes,
+            ahead=graph.ahead,
             heading_rad=graph.heading_rad,
             lane=graph.lane,
+            position_m=graph.position_m,
             points_m=graph.points_m,
         ),
         costs=StepCosts(

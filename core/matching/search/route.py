@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hippodrome.core.matching.search.coarse import coarse_problem
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.passes import TracedRoute, most_likely_route
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, search_problem
@@ -92,10 +93,11 @@ def most_likely_drive(problem: SearchProblem, config: RouteSearchConfig, start: 
     """As ``search_route``, for a problem that is set up already."""
     if start is not None:
         return best_route(problem, starts_near_pose(problem, start, config), config)
+    coarse = coarse_problem(problem, config)
     routes: list[Route] = []
     poor: list[Start] = []
     for anchor in anchor_samples(problem.track, config.anchors):
-        start_there = starts_without_prior(problem, anchor, config)
+        start_there = starts_without_prior(problem, coarse, anchor, config)
         if start_there.step_nats < -config.good_start_nats:
             poor.append(start_there)
             continue

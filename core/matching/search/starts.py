@@ -12,19 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hippodrome.core.matching.search.beam import backward
-from hippodrome.core.matching.search.coarse import good_states, hypotheses_in
+from hippodrome.core.matching.search.backward import backward
+from hippodrome.core.matching.search.coarse import CoarseStates, good_states, hypotheses_in
 from hippodrome.core.matching.search.config import RouteSearchConfig
+from hippodrome.core.matching.search.floor import Floor
 from hippodrome.core.matching.search.hypotheses import HYPOTHESIS, NOWHERE, PLACE, Hypotheses
 from hippodrome.core.matching.search.passes import forward_pass, last_survivors
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, compiled_drive, compiled_model
 from hippodrome.core.matching.search.track import Track
-from hippodrome.core.roads.lane_graph import (
-    LaneGraph,
-    build_lane_graph,
-    mirrored,
-    reversed_network,
-)
+from hippodrome.core.roads.lane_graph import mirrored, reversed_network
+from hippodrome.core.roads.lanes_ahead import SearchGraph, build_search_graph
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import Float32Array, StartPose
 
@@ -58,14 +55,25 @@ class Start(NamedTuple):
     step_nats: float  # mean log likelihood of a step after the anchor, for the best of the hypotheses there; -inf: there is none
 
 
-def starts_without_prior(problem: SearchProblem, anchor: int, config: RouteSearchConfig, least_nats: float = NOWHERE) -> Start:
+def starts_without_prior(
+    problem: SearchProblem, coarse: SearchProblem, anchor: int, config: RouteSearchConfig, floor: Floor | None = None,
+    among: CoarseStates | None = None,
+) -> Start:  # fmt: skip
     """Find hypotheses for the beginning of the drive without a start pose, by a search that begins at sample ``anchor``.
 
-    The coarse search rates all bins and scales at the anchor, a fine one those that it finds good; what both find good is traced
-    back to the beginning of the drive. What scores less than ``least_nats`` over the turns after the anchor is dropped.
+    The coarse search rates bins and scales at the anchor, a fine one those that it finds good; what both find good is traced back
+    to the beginning of the drive.
+
+    Args:
+        problem: the drive and the network.
+        coarse: what ``coarse_problem`` makes of it.
+        anchor: where to begin.
+        config: bounds of the search.
+        floor: what scores less over the samples after the anchor is dropped.
+        among: the coarse states to begin in; None: all.
     """
-    hypotheses = good_states(problem, anchor, config, least_nats)
-    hypotheses, step_nats = _good_over_horizon(problem, anchor, hypotheses, config, least_nats)
+    hypotheses = good_states(problem, coarse, anchor, config, floor, among)
+    hypotheses, step_nats = _good_over_horizon(problem, anchor, hypotheses, config, floor)
     if anchor == 0 or len(hypotheses) == 0:
         return Start(InitialHypotheses(hypotheses, _NO_PLACES), step_nats)
     return Start(_traced_to_beginning(problem, anchor, hypotheses, config), step_nats)
@@ -76,7 +84,7 @@ def starts_near_pose(problem: SearchProblem, start: StartPose, config: RouteSear
     scales = len(problem.log_scale)
     prior = _prior_nats(problem.graph, start)
     near = np.flatnonzero(prior >= prior.max() - config.beam_nats).astype(np.int32)
-    on_network = hypotheses_in(problem.graph, near, scales, float(problem.track.heading_rad[0]))
+    on_network = hypotheses_in(problem.graph, near, np.arange(scales, dtype=np.int32), float(problem.track.heading_rad[0]))
     on_network["score_nats"] = np.repeat(prior[near], scales)
     off, places = np.zeros(scales, HYPOTHESIS), np.zeros(scales, PLACE)
     off["bin"], off["scale_bin"] = -1 - np.arange(scales), np.arange(scales)
@@ -87,7 +95,7 @@ def starts_near_pose(problem: SearchProblem, start: StartPose, config: RouteSear
     return InitialHypotheses(np.concatenate([on_network, off]), places)
 
 
-def _prior_nats(graph: LaneGraph, start: StartPose) -> Float32Array:
+def _prior_nats(graph: SearchGraph, start: StartPose) -> Float32Array:
     """Log prior (N,) of beginning in each bin, up to a constant: normal in the place and in the heading."""
     away = np.hypot(graph.points_m[:, 0] - start.x_m, graph.points_m[:, 1] - start.y_m) / start.sigma_m
     turned = wrap(graph.heading_rad.astype(np.float64) - start.heading_rad) / start.sigma_rad
@@ -95,7 +103,7 @@ def _prior_nats(graph: LaneGraph, start: StartPose) -> Float32Array:
 
 
 def _good_over_horizon(
-    problem: SearchProblem, anchor: int, hypotheses: Hypotheses, config: RouteSearchConfig, least_nats: float
+    problem: SearchProblem, anchor: int, hypotheses: Hypotheses, config: RouteSearchConfig, floor: Floor | None
 ) -> tuple[Hypotheses, float]:
     """Those of the hypotheses at the anchor that also explain the turns after it in fine bins, with their scores there.
 
@@ -109,8 +117,9 @@ def _good_over_horizon(
     model, fresh = compiled_model(problem), hypotheses.copy()
     fresh["score_nats"] = 0.0  # the coarse scores are of the same turns and must not count twice
     initial = InitialHypotheses(fresh, _NO_PLACES)
+    least_nats = None if floor is None else floor.from_sample(anchor)
     survivors = forward_pass(drive, model, initial, config.beam_nats, config.most_survivors, least_nats=least_nats)
-    if survivors.died_out and least_nats > NOWHERE:
+    if survivors.died_out and floor is not None:
         return fresh[:0], NOWHERE
     last = last_survivors(survivors).hypotheses["score_nats"]
     through = backward(drive, model, config.seed_margin_nats, survivors, np.zeros(len(last), np.float32))[: len(fresh)]
@@ -126,7 +135,7 @@ def _traced_to_beginning(
     It runs on the reversed network, where lanes are driven from their end to their beginning and all headings are turned by pi.
     """
     network = reversed_network(problem.network)
-    graph = build_lane_graph(network, problem.graph.reach_limit_m, problem.bin_m)
+    graph = build_search_graph(network, problem.graph.reach_limit_m, problem.bin_m)
     backwards = replace(problem, network=network, graph=graph)
     drive = compiled_drive(backwards, problem.track.heading_rad[anchor::-1] + np.pi)
     initial = InitialHypotheses(_time_reversed(problem.graph, hypotheses), _NO_PLACES)
@@ -138,7 +147,7 @@ def _traced_to_beginning(
     return InitialHypotheses(first, places)
 
 
-def _time_reversed(graph: LaneGraph, hypotheses: Hypotheses) -> Hypotheses:
+def _time_reversed(graph: SearchGraph, hypotheses: Hypotheses) -> Hypotheses:
     """Convert hypotheses between a lane graph and that of the reversed network: the same places, with time running backwards.
 
     Bins are counted from the other end of their lane, and the driven length beyond a bin's centre changes its sign.

@@ -11,17 +11,20 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from hippodrome.core.matching.search.hypotheses import Hypotheses, Hypothesis, Places, Successors
 from hippodrome.core.matching.search.model import SearchModel, StepCosts, StepObservation
 from hippodrome.core.matching.search.off_network import dead_reckoned, followed_offset, rejoin
+from hippodrome.core.roads.lanes_ahead import WAYS
 from hippodrome.core.se2 import wrap_near_zero
 
 MOST_SUCCESSORS = 2048  # room for one hypothesis: a few bins x scale bins x branches of a junction, or the bins around a place
 _FARTHEST_JUMP = 12  # scale bins of the largest jump in scale: 50 % either way
 _JUMP_SPREAD = 2.0  # only hypotheses this close to the best (nats) may jump in scale ...
 _MOST_JUMPING = 200  # ... and only if they are no more than this
+_BEFORE, _BEHIND = 0.501, 0.499  # centres of bins lie half a bin from their ends, and a little room for rounding
 
 
 class _Prediction(NamedTuple):
@@ -33,8 +36,6 @@ class _Prediction(NamedTuple):
     tolerance_m: float  # bins that are off by more are not tried
     heading_offset_rad: float
     heading_rad: float  # expected heading on the network
-    first: int  # rows first:last of the reach table may be near enough
-    last: int
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -57,10 +58,9 @@ def expand(
     The scale may change by one bin, or by many if ``may_jump``. Without a change of scale, bins next to the predicted one are
     tried too, since a corner that is cut or taken wide makes the driven length differ from that of the lane.
     """
-    graph, costs, scales = model.graph, model.costs, model.scales
+    costs, scales = model.costs, model.scales
     own, offset, remainder = hypothesis.scale_bin, float(hypothesis.heading_offset_rad), float(hypothesis.remainder_m)
     heading = observation.heading_rad + offset
-    first, last = graph.reach_start[hypothesis.bin], graph.reach_start[hypothesis.bin + 1]
     farthest = _FARTHEST_JUMP if may_jump else 1
     half_bin, with_neighbour = costs.half_bin_m, 3.0 * costs.half_bin_m  # from the centre to the end of the bin, of the next one
     count = 0
@@ -69,41 +69,59 @@ def expand(
         if cost > most_cost:
             continue
         ahead = observation.step * scales[scale_bin] + remainder
-        while first < last and graph.reach_m[first] < ahead - with_neighbour:
-            first += 1  # scales ascend, so that a bin too near for this scale is too near for the next one
         tolerance = with_neighbour if scale_bin == own else half_bin
-        prediction = _Prediction(scale_bin, cost, ahead, tolerance, offset, heading, first, last)
-        count = _append_reached(prediction, observation, model, most_cost, out, count)
+        prediction = _Prediction(scale_bin, cost, ahead, tolerance, offset, heading)
+        count = _append_ahead(hypothesis.bin, prediction, observation, model, most_cost, out, count)
     return count
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _append_reached(
-    prediction: _Prediction, observation: StepObservation, model: SearchModel, most_cost: float, out: Successors, count: int
-) -> int:
-    """Append to ``out`` the bins near the prediction that cost at most ``most_cost``; returns the new number of rows."""
-    graph, costs = model.graph, model.costs
-    for r in range(prediction.first, prediction.last):
-        error = prediction.ahead_m - graph.reach_m[r]
-        if error < -prediction.tolerance_m:
-            break
-        if error > prediction.tolerance_m:
-            continue
-        target = graph.reach_bin[r]
-        turn = wrap_near_zero(graph.heading_rad[target] - prediction.heading_rad)
-        cost = prediction.cost_nats + costs.lane_change_nats * graph.lane_changes[r] + _heading_cost(turn, costs)
-        cost += _length_cost(error, costs)
-        cost += _place_cost(graph.points_m[target, 0], graph.points_m[target, 1], observation, costs)
-        if cost > most_cost:
-            continue
-        if count == out.shape[0]:
-            return count
-        successor = out[count]
-        successor.bin, successor.scale_bin, successor.log_likelihood = target, prediction.scale_bin, -cost
-        successor.heading_offset_rad = followed_offset(prediction.heading_offset_rad, turn, costs)
-        successor.remainder_m = min(max(error, -costs.half_bin_m), costs.half_bin_m)
-        count += 1
+def _append_ahead(
+    bin_: int, prediction: _Prediction, observation: StepObservation, model: SearchModel, most_cost: float, out: Successors,
+    count: int,
+) -> int:  # fmt: skip
+    """Append to ``out`` the bins near the prediction that cost at most ``most_cost``; returns the new number of rows.
+
+    The lanes ahead are gone through way by way: on the lane itself, or on an adjacent one after a lane change.
+    """
+    graph, ahead = model.graph, model.graph.ahead
+    nearest, farthest = prediction.ahead_m - prediction.tolerance_m, prediction.ahead_m + prediction.tolerance_m
+    for way in range(WAYS * graph.lane[bin_], WAYS * graph.lane[bin_] + WAYS):
+        entry_m = graph.position_m[bin_] * ahead.entry[way]
+        change_nats = 0.0 if way % WAYS == 0 else model.costs.lane_change_nats
+        for r in range(ahead.start[way], ahead.start[way + 1]):
+            row = ahead.rows[r]
+            begin_m = row.begin_m - entry_m
+            if begin_m > farthest:
+                break
+            first = max(math.ceil((nearest - begin_m) / row.bin_m - _BEFORE), 0)
+            last = min(math.floor((farthest - begin_m) / row.bin_m - _BEHIND), row.bin_count - 1)
+            for n in range(first, last + 1):
+                distance_m = begin_m + (n + 0.5) * row.bin_m
+                error = prediction.ahead_m - float(np.float32(distance_m))
+                if distance_m <= 0.0 or abs(error) > prediction.tolerance_m or count == out.shape[0]:
+                    continue
+                count = _append(row.first_bin + n, error, change_nats, prediction, observation, model, most_cost, out, count)
     return count
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _append(
+    target: int, error_m: float, change_nats: float, prediction: _Prediction, observation: StepObservation, model: SearchModel,
+    most_cost: float, out: Successors, count: int,
+) -> int:  # fmt: skip
+    """Append a bin to ``out`` unless it costs more than ``most_cost``; returns the new number of rows."""
+    graph, costs = model.graph, model.costs
+    turn = wrap_near_zero(graph.heading_rad[target] - prediction.heading_rad)
+    cost = prediction.cost_nats + change_nats + _heading_cost(turn, costs) + _length_cost(error_m, costs)
+    cost += _place_cost(graph.points_m[target, 0], graph.points_m[target, 1], observation, costs)
+    if cost > most_cost:
+        return count
+    successor = out[count]
+    successor.bin, successor.scale_bin, successor.log_likelihood = target, prediction.scale_bin, -cost
+    successor.heading_offset_rad = followed_offset(prediction.heading_offset_rad, turn, costs)
+    successor.remainder_m = min(max(error_m, -costs.half_bin_m), costs.half_bin_m)
+    return count + 1
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -93,7 +93,7 @@ def searched(visits, network, start=None):
     config = RouteSearchConfig()
     problem = search_problem(visits, network, config)
     route = most_likely_drive(problem, config, start)
-    return route, match_status(route, control_of(problem, config), CONFIG, start_known=start is not None)
+    return route, match_status(route, control_of(problem, config, route), CONFIG, start_known=start is not None)
 
 
 def test_a_self_similar_grid_is_ambiguous_without_a_prior_and_matched_with_one():

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from hippodrome.core.matching.search.beam import BeamLimits, backward, forward
+from hippodrome.core.matching.search.backward import backward
+from hippodrome.core.matching.search.beam import BeamLimits, forward
 from hippodrome.core.matching.search.config import OffNetworkCosts, SearchCosts
 from hippodrome.core.matching.search.hypotheses import HYPOTHESIS, NOWHERE, PLACE, SUCCESSOR
 from hippodrome.core.matching.search.model import StepObservation
 from hippodrome.core.matching.search.problem import SearchProblem, compiled_drive, compiled_model
 from hippodrome.core.matching.search.successors import expand, jump_bar, successors
 from hippodrome.core.matching.search.track import Track
-from hippodrome.core.roads.lane_graph import build_lane_graph
+from hippodrome.core.roads.lanes_ahead import build_search_graph
 from tests.core.synthetic import lanes_of
 
 COSTS = SearchCosts()
@@ -21,7 +22,7 @@ def problem(network=FORK, headings=(0.0, 0.0, 0.0, 0.0), log_scale=(0.0,)):
     """Steps of 5 m, bins of 1 m."""
     samples = 5.0 * np.arange(len(headings))
     track = Track(samples, np.array(headings), samples, 5.0)
-    graph = build_lane_graph(network, 20.0)
+    graph = build_search_graph(network, 20.0)
     return SearchProblem(network, track, np.array(log_scale), graph, COSTS, OffNetworkCosts(), 1.0)
 
 
@@ -112,7 +113,7 @@ def test_max_marginals_are_the_scores_of_complete_routes():
     bent = problem(headings=(0.0, 0.1, 0.3, 0.5))
     drive, model = compiled_drive(bent, bent.track.heading_rad), compiled_model(bent)
     initial = np.concatenate([hypothesis(bin=0), hypothesis(bin=2, score_nats=-0.3)])
-    survivors = forward(drive, model, BeamLimits(1e3, 10_000, 0, 1_000_000, NOWHERE), initial, np.empty(0, PLACE))
+    survivors = forward(drive, model, BeamLimits(1e3, 10_000, 0, 1_000_000, np.full(4, NOWHERE)), initial, np.empty(0, PLACE))
     row_start, rows = survivors.row_start, survivors.hypotheses
     last = rows["score_nats"][row_start[-2] :]
     through = backward(drive, model, 1e3, survivors, np.zeros(len(last), np.float32))

@@ -21,8 +21,8 @@ from typing import Any, Final
 from hippodrome._folders import temporary_folder
 from hippodrome.core.types import FloatArray, Frame, Observation
 from hippodrome.eval.contest.guard import Crashed
-from hippodrome.eval.contest.process import POLL_S, Limits, Process, started
 from hippodrome.eval.methods.protocol import Given, Localized, Mapped, MethodError
+from hippodrome.eval.programs.process import POLL_S, Limits, Process, started
 from hippodrome.sim.method_spec import MethodSpec
 
 CHILD: Final = "hippodrome.eval.contest.child"

@@ -59,6 +59,19 @@ class Apart:
         self._process = None
         self._stack.close()
 
+    def prepare(self) -> None:
+        """Make the object, so that what it is asked for next is measured without that."""
+        self._call("ready", None)
+
+    def cpu_s(self) -> float:
+        """CPU time that its process has taken so far."""
+        return 0.0 if self._process is None else self._process.cpu_now_s()
+
+    @property
+    def peak_rss_bytes(self) -> int | None:
+        """The most memory that its process held when it was looked at."""
+        return None if self._process is None else self._process.peak_rss_bytes
+
     def _map(self, observations: Iterator[Observation], given: Given) -> Mapped:
         mapped: Mapped = self._call("map", _sendable(given), observations)
         return replace(mapped, save=self._save) if mapped.save is not None else mapped

@@ -10,13 +10,14 @@ from time import process_time
 
 import numpy as np
 
-from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, Observation, Trajectory
+from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, Observation, StartPose, Trajectory
 from hippodrome.eval.contest.entry import Entry
 from hippodrome.eval.contest.guard import guarded
 from hippodrome.eval.methods.feed import Feed
-from hippodrome.eval.methods.materials import Materials, true_start
+from hippodrome.eval.methods.materials import Materials, true_start, truth_of
+from hippodrome.eval.methods.memory import Growth
 from hippodrome.eval.methods.method import SEMI_METRIC
-from hippodrome.eval.methods.needs import camera_of, metres_per_unit, require_met
+from hippodrome.eval.methods.needs import camera_of, has_frames, is_foreign, metres_per_unit, require_met
 from hippodrome.eval.methods.protocol import (
     Cost,
     Given,
@@ -43,8 +44,9 @@ class Drawn:
     mapped: Mapped
     cpu_s: float  # of its map alone
     whole_s: float  # with the map that it builds on
-    step_s: FloatArray
+    step_s: FloatArray  # of each observation; of the map that it builds on, if it sees none
     map_bytes: int | None
+    peak_rss_bytes: int | None = None
 
 
 def draw_all(materials: Materials, entries: Sequence[Entry], folders: Mapping[str, Path]) -> dict[str, Drawn | str]:
@@ -108,7 +110,11 @@ def _placement(entry: Entry, materials: Materials, mapped: Mapped) -> Transform 
     """
     if entry.method.frame != "metric" or entry.builds_on is not None:
         return None
-    pairs = associate(mapped.trajectory, materials.mapping.ground_truth())
+    if (truth := truth_of(materials.mapping)) is None:
+        raise MethodError(
+            "its answers lie in a frame of its own, and only the truth of the mapping drive lays that on the network"
+        )
+    pairs = associate(mapped.trajectory, truth)
     return find_alignment("se2", pairs.estimate, pairs.reference)
 
 
@@ -149,17 +155,19 @@ def _draw(entry: Entry, materials: Materials, drawn: Mapping[str, Drawn | str], 
     given = _given(entry, materials, materials.mapping, folder, base.mapped if base else None)
     if (warm_up := getattr(entry.runner, "warm_up", None)) is not None:
         guarded(label, warm_up, materials)
-    feed = Feed(_observations(entry, materials.mapping, None))
+    feed, growth = Feed(_observations(entry, materials.mapping, None)), Growth()
     began = process_time()
     mapped = guarded(label, lambda: as_mapped(entry.runner.map(iter(feed), given), label), materials)
     cpu_s = process_time() - began - feed.decoding_s
     feed.settle()
+    peak_rss_bytes = growth.as_if_alone_bytes() if mapped.cost is None else mapped.cost.peak_rss_bytes
     check_trajectory(mapped.trajectory, label)
     map_bytes = guarded(label, lambda: _save(entry, mapped, materials), materials)
     step_s = feed.step_s
     if (cost := mapped.cost) is not None:
         cpu_s, step_s = cost.cpu_s, np.zeros(0) if cost.step_s is None else cost.step_s
-    return Drawn(mapped, cpu_s, cpu_s + (base.whole_s if base else 0.0), step_s, map_bytes)
+    step_s = base.step_s if base is not None and len(step_s) == 0 else step_s
+    return Drawn(mapped, cpu_s, cpu_s + (base.whole_s if base else 0.0), step_s, map_bytes, peak_rss_bytes)
 
 
 def _save(entry: Entry, mapped: Mapped, materials: Materials) -> int | None:
@@ -179,16 +187,23 @@ def _given(entry: Entry, materials: Materials, drive: Recording, folder: Path, b
     require_met(needs, scenario, drive)
     return Given(
         camera=camera_of(scenario, drive),
-        rate_hz=scenario.odometry_rate_hz,
+        rate_hz=1.0 / float(np.median(drive.samples.dt_s)) if is_foreign(drive) else scenario.odometry_rate_hz,
         duration_s=float(drive.samples.t_s[-1]),
         seed=scenario.seed,
         folder=folder,
         roads=materials.roads if needs.road_network else None,
-        start=true_start(drive) if needs.start_pose and drive is materials.mapping else None,
+        start=_start(drive) if needs.start_pose and drive is materials.mapping else None,
         metres_per_unit=metres_per_unit(scenario, drive) if needs.metric_scale else None,
+        frames=has_frames(drive),
         base=base,
         concealed=tuple(folder for folder in materials.truth_folders if folder.is_dir()),
     )
+
+
+def _start(drive: Recording) -> StartPose:
+    if truth_of(drive) is None:
+        raise MethodError("it needs the start pose, and nobody knows where a drive without truth began; import it with --truth")
+    return true_start(drive)
 
 
 def _observations(entry: Entry, drive: Recording, stretch: tuple[int, int] | None) -> Iterator[Observation]:

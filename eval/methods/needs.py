@@ -23,6 +23,11 @@ def is_foreign(drive: Recording) -> bool:
     return "imported" in getattr(drive, "manifest", {})
 
 
+def has_frames(drive: Recording) -> bool:
+    """Whether a drive has any frame: one that was imported as bare odometry has none."""
+    return getattr(drive, "frame_count", 1) > 0
+
+
 def metres_per_unit(scenario: Scenario, drive: Recording) -> float | None:
     """Length of the unit of a drive's speeds in metres; None if nobody can know it.
 
@@ -37,7 +42,7 @@ def metres_per_unit(scenario: Scenario, drive: Recording) -> float | None:
 
 def require_met(needs: Needs, scenario: Scenario, drive: Recording) -> None:
     """Raise MethodError, with the cause and the cure, unless a drive has what a method needs of it."""
-    if needs.camera and getattr(drive, "frame_count", 1) == 0:
+    if needs.camera and not needs.frames_optional and not has_frames(drive):
         raise MethodError("it needs frames, and the drive has none; import it with the frames of its camera")
     camera, foreign = camera_of(scenario, drive), is_foreign(drive)
     if needs.stereo and camera.stereo_baseline_m is None:

@@ -49,6 +49,7 @@ class Needs:
     size_px: tuple[int, int] | None = None  # width and height that frames have at least
     grain: bool = False  # surfaces with the grain that trackers of corners live on
     metric_scale: bool = False  # how many metres a unit of the self-motion has, as ``Given.metres_per_unit``
+    frames_optional: bool = False  # it does with self-motion alone where a drive has no frames
 
     def in_words(self) -> str:
         """What the report says: ``self-motion, frames of one camera, the road network``."""
@@ -113,6 +114,7 @@ class Given:
     roads: RoadNetwork | None = None
     start: StartPose | None = None
     metres_per_unit: float | None = None  # of the speeds
+    frames: bool = True  # whether the drive has any
     base: Mapped | None = None  # the map of the method that it builds on, if it names one in ``builds_on``
     mapped: Mapped | None = None  # for ``localize``: what its own ``map`` returned, or else its ``base``
     concealed: tuple[Path, ...] = ()  # folders with the truth, which a program of its own is not to see

@@ -18,8 +18,8 @@ import numpy as np
 
 from benchmarks.table import Row
 from hippodrome.core.types import Observation
-from hippodrome.eval.contest.stream import StreamMapper
 from hippodrome.eval.methods.protocol import Given
+from hippodrome.eval.programs.stream import StreamMapper
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.scenario import Scenario
 

@@ -16,6 +16,7 @@ from hippodrome.eval.contest.perform import drawn_methods, perform
 from hippodrome.eval.figures.scenario import draw_scenario
 from hippodrome.eval.methods.materials import gather
 from hippodrome.eval.methods.method import SEMI_METRIC
+from hippodrome.eval.methods.needs import has_frames
 from hippodrome.eval.methods.warm_up import warm_up
 from hippodrome.eval.report.belief import write_second_drive
 from hippodrome.eval.report.evidence import write_map_evidence
@@ -44,12 +45,14 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
         HippodromeError: A method cannot be loaded; or there are only ours, and no semi-metric map can be made of the drive.
     """
     warm_up()
-    materials = gather(task.scenario, task.out)
+    materials = gather(task.scenario, task.out, truthless=True)
     performance = perform(materials, entries_of(task.scenario))
     shown = drawn_methods(performance.outcomes)
     scored = {outcome.method: outcome.scored for outcome in shown}
     localized = {outcome.method: outcome for outcome in shown if outcome.localized is not None}
-    write_trajectories(materials, performance.outcomes)
+    write_trajectories(materials, [*performance.outcomes, *performance.unscored])
+    if performance.unscored or not (has_frames(materials.mapping) and has_frames(materials.drive)):
+        return scenario_result(materials, performance.rows, performance.outcomes)  # the pictures show frames and errors
     write_map_evidence(materials, scored, localized)
     write_second_drive(materials, localized)
     write_why(materials.folder, localized)

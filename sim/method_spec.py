@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any, Literal
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_serializer, model_validator
 
 from hippodrome.sim.spec import Spec
 
 Layout = Literal["tum", "euroc", "kitti", "rosbag2", "mcap"]
+STEREO_LAYOUTS: Final = ("euroc", "kitti")  # those that have a place for the right image
+Need = Annotated[str, Field(pattern=r"^(road_network|start_pose|stereo|grain|metric_scale|[1-9][0-9]{1,3}x[1-9][0-9]{1,3})$")]
 
 
 class MethodSpec(Spec):
@@ -21,9 +24,12 @@ class MethodSpec(Spec):
     config: dict[str, Any] = Field(default_factory=dict)  # for the class: the fields of its own Config
     input: Layout = "tum"  # for the program that reads files: how the sequence lies there
     frame: Literal["own", "network", "metric"] | None = None  # in which a program answers; None: what a class says, or own
-    needs: tuple[Literal["road_network", "start_pose"], ...] = ()  # of a program; a class declares its own
+    axes: Literal["body", "camera"] = "body"  # of poses that a program leaves: the rear axle's, or a camera's that looks along z
+    needs: tuple[Need, ...] = ()  # of a program, 640x480 for a size among them; a class declares its own
     localize: str | None = None  # command of the same kind for the second drive; {map} stands for what the first call left
+    environment: Path | None = None  # requirements with hashes: {python} stands for the Python of an environment made of them
     time_limit_s: Annotated[float, Field(gt=0, le=86_400)] = 3_600.0  # for each drive
+    stall_limit_s: Annotated[float, Field(gt=0)] | None = None  # without work; None: it may idle as long as it likes
     memory_limit_mb: Annotated[float, Field(ge=64)] = 8_000.0  # address space of each of its processes
 
     @model_validator(mode="before")
@@ -41,6 +47,16 @@ class MethodSpec(Spec):
             raise ValueError("a method has one of the keys class, command and stream")
         if self.command is not None and not ("{sequence}" in self.command and "{out}" in self.command):
             raise ValueError("a command names the folders {sequence} and {out}, as in './run.sh {sequence} {out}'")
+        if self.class_ is not None and (unmeant := [name for name in _OF_PROGRAMS if getattr(self, name) != _default(name)]):
+            raise ValueError(f"{unmeant[0]} is for programs; a class declares what it needs and how it answers")
+        if "stereo" in self.needs and self.command is not None and self.input not in STEREO_LAYOUTS:
+            layouts = " or ".join(STEREO_LAYOUTS)
+            raise ValueError(f"input {self.input} has no place for the right image of a stereo pair; use {layouts}")
+        if self.axes == "camera" and self.stream is not None:
+            raise ValueError("axes is for programs that leave a file; over the stream poses are planar, of the rear axle")
+        commands = [command for command in (self.command, self.stream, self.localize) if command is not None]
+        if (self.environment is not None) != any("{python}" in command for command in commands):
+            raise ValueError("environment and {python} go together: {python} in a command is the Python of the environment")
         if self.localize is not None and self.class_ is not None:
             raise ValueError("localize is a command, for programs; a class has a function of this name")
         if (
@@ -57,7 +73,19 @@ class MethodSpec(Spec):
         fields = type(self).model_fields
         values = {name: getattr(self, name) for name in fields}
         kept = {name: value for name, value in values.items() if value != fields[name].get_default(call_default_factory=True)}
-        return {fields[name].alias or name: list(value) if isinstance(value, tuple) else value for name, value in kept.items()}
+        return {fields[name].alias or name: _plain(value) for name, value in kept.items()}
 
     def __hash__(self) -> int:
         return hash(json.dumps(self.model_dump(), sort_keys=True, default=str))
+
+
+def _plain(value: Any) -> Any:
+    """A value as YAML has it."""
+    return list(value) if isinstance(value, tuple) else str(value) if isinstance(value, Path) else value
+
+
+_OF_PROGRAMS: Final = ("axes", "needs", "environment", "stall_limit_s")
+
+
+def _default(name: str) -> Any:
+    return MethodSpec.model_fields[name].default

@@ -39,9 +39,10 @@ CORE_ROOMS = {
 }
 # The rooms of eval from the lowest to the highest: each may import only those before it.
 EVAL_ROOMS = (
-    "metrics", "files", "methods", "results", "pool", "reuse", "figures", "report", "rivals/ratslam", "rivals/orbslam3",
-    "rivals", "contest", "evaluate", "run", "authoring", "gate", "board", "sweep", "trials/stress", "trials/robustness",
-    "trials/rivals", "exchange/drives", "exchange/readers", "exchange/formats", "exchange", "real", "commands", "cli",
+    "metrics", "files", "methods", "programs", "results", "pool", "reuse", "figures", "report", "rivals/ratslam",
+    "rivals/orbslam3", "rivals", "contest", "evaluate", "run", "authoring", "gate", "board", "sweep", "trials/stress",
+    "trials/robustness", "trials/rivals", "exchange/drives", "exchange/readers", "exchange/formats", "exchange", "real",
+    "commands", "cli",
 )  # fmt: skip
 CORE_PACKAGES = {"cv2", "numba", "numpy", "scipy"}
 STANDARD_IN_CORE = {"__future__", "collections", "dataclasses", "enum", "functools", "heapq", "itertools", "math", "typing"}

@@ -21,8 +21,8 @@ from typing import Any, Final
 from hippodrome._folders import temporary_folder
 from hippodrome.core.types import FloatArray, Frame, Observation
 from hippodrome.eval.contest.guard import Crashed
-from hippodrome.eval.contest.process import POLL_S, Limits, Process, started
 from hippodrome.eval.methods.protocol import Given, Localized, Mapped, MethodError
+from hippodrome.eval.programs.process import POLL_S, Limits, Process, started
 from hippodrome.sim.method_spec import MethodSpec
 
 CHILD: Final = "hippodrome.eval.contest.child"
@@ -58,6 +58,19 @@ class Apart:
         """End the process; a later call begins another."""
         self._process = None
         self._stack.close()
+
+    def prepare(self) -> None:
+        """Make the object, so that what it is asked for next is measured without that."""
+        self._call("ready", None)
+
+    def cpu_s(self) -> float:
+        """CPU time that its process has taken so far."""
+        return 0.0 if self._process is None else self._process.cpu_now_s()
+
+    @property
+    def peak_rss_bytes(self) -> int | None:
+        """The most memory that its process held when it was looked at."""
+        return None if self._process is None else self._process.peak_rss_bytes
 
     def _map(self, observations: Iterator[Observation], given: Given) -> Mapped:
         mapped: Mapped = self._call("map", _sendable(given), observations)

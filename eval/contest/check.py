@@ -21,6 +21,7 @@ from hippodrome.eval.methods.warm_up import warm_up
 from hippodrome.eval.metrics.alignment import find_alignment
 from hippodrome.eval.metrics.association import associate
 from hippodrome.eval.results.model import Row
+from hippodrome.eval.rivals.orbslam3.method import OrbSlam3
 from hippodrome.sim.record import ROLES, RecordingPlan, record
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import DriveSpec, Scenario
@@ -51,6 +52,7 @@ class Finding:
 def list_lines() -> list[str]:
     """What ``method list`` prints: ours, and those that installed packages make known."""
     lines = [f"{cls.card.key:<18} {cls.card.label:<28} {cls.needs.in_words()}" for cls in BUILT_IN]
+    lines += [f"{OrbSlam3.card.key:<18} {OrbSlam3.label:<28} {OrbSlam3.needs.in_words()}; --method {OrbSlam3.label}"]
     lines += [f"{point.name:<18} {point.value:<28} installed: --method {point.name}" for point in entry_points(group=GROUP)]
     return lines
 

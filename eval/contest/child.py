@@ -59,6 +59,9 @@ class Served:
         vector: FloatArray = np.asarray(self._runner.describe(frame))
         return vector
 
+    def ready(self, _: None) -> None:
+        """The object is there: it was made for this call, if not before."""
+
     def warm_up(self, _: None) -> None:
         """Whatever it does before it is timed."""
         self._runner.warm_up()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Final
@@ -13,19 +13,22 @@ from pydantic import ValidationError
 
 from hippodrome.eval.contest.apart import Apart, apart
 from hippodrome.eval.contest.loading import load_class, made_of, require_config
-from hippodrome.eval.contest.process import can_conceal
-from hippodrome.eval.contest.program import ProgramLocalizer, ProgramMapper
-from hippodrome.eval.contest.stream import StreamLocalizer, StreamMapper
 from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, stem_of
 from hippodrome.eval.methods.ours import DeadReckoning, SemiMetric, Topometric, TopometricPaper
 from hippodrome.eval.methods.protocol import Describes, Localizes, Maps, MethodError, Needs
+from hippodrome.eval.programs.process import can_conceal
+from hippodrome.eval.programs.program import ProgramLocalizer, ProgramMapper
+from hippodrome.eval.programs.stream import StreamLocalizer, StreamMapper
 from hippodrome.eval.results.model import Declaration
+from hippodrome.eval.rivals.orbslam3.method import OrbSlam3
 from hippodrome.eval.rivals.rows import NoAttractor, RatSlamMethod
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.scenario import METHOD_NAME, Scenario
 
 # In the order of the tables. They are made and run as everybody's methods are.
 BUILT_IN: Final[tuple[type[Any], ...]] = (DeadReckoning, SemiMetric, RatSlamMethod, NoAttractor, TopometricPaper, Topometric)
+# Ours as well, that take part only where they are asked for, by their labels.
+OFFERED: Final = {OrbSlam3.label: f"{OrbSlam3.__module__}:{OrbSlam3.__qualname__}"}
 GROUP: Final = "hippodrome.methods"  # of entry points, by which an installed package makes its methods known
 
 
@@ -78,9 +81,9 @@ def parse_method(text: str) -> Added:
     name, source = (found.group(1), found.group(2)) if found else (None, text)
     kind, _, rest = source.partition(":")
     if not rest:
-        installed = {point.name: point.value for point in entry_points(group=GROUP)}
+        installed = OFFERED | {point.name: point.value for point in entry_points(group=GROUP)}
         if source not in installed:
-            names = ", ".join(sorted(installed)) or "there is none"
+            names = ", ".join(sorted(installed))
             raise ValueError(
                 f"'{source}' is neither module:Class, exec:COMMAND nor stream:COMMAND, nor an installed method ({names})"
             )
@@ -127,6 +130,8 @@ def _foreign(name: str, spec: MethodSpec, scenario: Scenario) -> Entry:
     cls = load_class(spec.class_)
     method = _card(name, str(spec.frame or getattr(cls, "frame", "own")))
     require_config(cls, spec.config, method.label)
+    if spec.class_ in OFFERED.values():  # what it does is done by a process of its own
+        return replace(_entry_of(cls, method, made_of(cls, spec.config, None, method.label), "hippodrome"), apart=True)
     return _entry_of(cls, method, apart(cls, method.label, spec), spec.class_)
 
 
@@ -135,9 +140,17 @@ def _program(name: str, spec: MethodSpec) -> Entry:
     command = spec.command or spec.stream or ""
     mapper, localizer = (StreamMapper, StreamLocalizer) if spec.stream else (ProgramMapper, ProgramLocalizer)
     runner = localizer(spec) if spec.localize else mapper(spec)
-    needs = Needs(road_network="road_network" in spec.needs, start_pose="start_pose" in spec.needs)
+    needs = _needs(spec)
     source = f"{'stream' if spec.stream else 'exec'}:{command}"
     return Entry(_card(name, spec.frame or "own"), runner, needs, None, source, apart=True)
+
+
+def _needs(spec: MethodSpec) -> Needs:
+    """What a scenario says that a program needs."""
+    named = {name: True for name in spec.needs if "x" not in name}
+    sizes = [tuple(map(int, name.split("x"))) for name in spec.needs if "x" in name]
+    size_px = (max(width for width, _ in sizes), max(height for _, height in sizes)) if sizes else None
+    return Needs(**named, size_px=size_px)
 
 
 def _card(label: str, frame: str) -> Method:
@@ -164,7 +177,7 @@ def _require_names(entries: Iterable[Entry]) -> None:
     entries, taken = list(entries), set[str]()
     reserved = {method.stem for method in METHODS} - {cls.card.stem for cls in BUILT_IN}
     for entry in entries:
-        if entry.method.stem in taken | reserved:
+        if entry.method.stem in taken or (entry.method.stem in reserved and not isinstance(entry.runner, OrbSlam3)):
             raise MethodError(f"method {entry.method.label}: there is one of this name already; give it another, NAME=...")
         taken.add(entry.method.stem)
     keys = [entry.method.key for entry in entries]

@@ -55,27 +55,45 @@ class Materials:
         return {"method": method.label, "scenario": configuration, "recording": self.mapping.folder.name}
 
 
-def gather(scenario: Scenario, out: Path) -> Materials:
-    """The finished recordings of a scenario below ``out``, and its road network as surveyed. Makes the scenario's folder."""
+def gather(scenario: Scenario, out: Path, *, truthless: bool = False) -> Materials:
+    """The finished recordings of a scenario below ``out``, and its road network as surveyed. Makes the scenario's folder.
+
+    Args:
+        scenario: The scenario.
+        out: Folder of the results.
+        truthless: Whether drives of which the truth is not known are taken as well, as far as they go.
+
+    Raises:
+        HippodromeError: A recording cannot be read, or has no truth and is not to be taken without.
+    """
     mapping, drive = RecordingPlan(scenario, "mapping", out), RecordingPlan(scenario, "localization", out)
     town = mapping.town()
     rng = np.random.default_rng([scenario.seed, 2])
     roads = with_survey_error(town.network, scenario.self_motion_noise.survey_error_m, rng)
     recordings = finish(mapping), finish(drive)
     for recording in recordings:
-        _require_truth(recording)
+        if not truthless and (cause := why_unscored(recording)) is not None:
+            raise HippodromeError(f"{recording.folder}: {cause}")
     folder = out / scenario.name
     folder.mkdir(parents=True, exist_ok=True)
     return Materials(scenario, folder, town, roads, *recordings)
 
 
-def _require_truth(recording: Recording) -> None:
-    """Raise HippodromeError unless the truth of a recording is known at all its steps, in the road network's frame."""
-    cure = "import it with --truth and --truth-frame network, or use `hippodrome run`, which needs no truth"
-    if not np.isfinite(recording.samples.poses_m).all():
-        raise HippodromeError(f"{recording.folder}: its truth is not known everywhere, so no method can be scored on it; {cure}")
-    if recording.manifest.get("truth_frame", "network") != "network":
-        raise HippodromeError(f"{recording.folder}: its truth lies in a frame of its own, not in the road network's; {cure}")
+def why_unscored(recording: Recording) -> str | None:
+    """Why nothing can be scored on a recording: its truth is not known at all steps in the road network's frame. None: it is."""
+    known = np.isfinite(recording.samples.poses_m).all(axis=1)
+    if not known.all():
+        share = f"is known for {known.mean():.0%} of its steps only" if known.any() else "is not known"
+        return f"the truth of the drive {share}; import it with --truth and --truth-frame network to have errors"
+    if getattr(recording, "manifest", {}).get("truth_frame", "network") != "network":
+        cure = "import it with --truth-frame network if it lies there"
+        return f"the truth of the drive lies in a frame of its own, not in the road network's; {cure}"
+    return None
+
+
+def truth_of(recording: Recording) -> Trajectory | None:
+    """The truth of a recording, if methods can be scored by it."""
+    return recording.ground_truth() if why_unscored(recording) is None else None
 
 
 def true_start(drive: Recording) -> StartPose:
@@ -141,7 +159,21 @@ class Outcome:
     failure: str | None = None  # why it has no localization, if it should have one
 
     @property
+    def trajectory(self) -> Trajectory:
+        """Its trajectory at the scored times."""
+        return self.scored.trajectory
+
+    @property
     def refined(self) -> CognitiveMap | None:
         """Its topometric map, if it made one of our kind."""
         found = self.mapped.cognitive_map
         return found if found is not None and found.frame == "network" else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unscored:
+    """What one method came to on a mapping drive without truth."""
+
+    method: Method
+    trajectory: Trajectory
+    localization: Localization | None = None

@@ -9,6 +9,7 @@ import numpy as np
 
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
 from hippodrome.core.mapping.mapper import Mapper, MapperConfig
+from hippodrome.core.mapping.motion_mapper import MotionMapper
 from hippodrome.core.refinement.refine import RefineConfig, refine
 from hippodrome.core.types import CognitiveMap, LocalizationEstimate, Observation, Trajectory
 from hippodrome.eval.methods.materials import refine_config
@@ -44,7 +45,7 @@ class SemiMetric:
     """The mapper: right in its connections, wrong in its metres."""
 
     card: ClassVar = SEMI_METRIC
-    needs: ClassVar = Needs()
+    needs: ClassVar = Needs(frames_optional=True)
 
     def __init__(self, config: MapperConfig) -> None:
         self._config = config
@@ -56,7 +57,7 @@ class SemiMetric:
 
     def map(self, observations: Iterator[Observation], given: Given) -> Mapped:
         """The semi-metric map."""
-        mapper = Mapper(self._config)
+        mapper = Mapper(self._config) if given.frames else MotionMapper(self._config)
         for observation in observations:
             mapper.step(observation)
         return mapped_of(mapper.finish())
@@ -66,7 +67,7 @@ class Topometric:
     """The semi-metric map refined with the road network, and the localizer in it."""
 
     card: ClassVar[Method] = TOPOMETRIC
-    needs: ClassVar = Needs(road_network=True)
+    needs: ClassVar = Needs(road_network=True, frames_optional=True)
     builds_on: ClassVar = SEMI_METRIC.key
     mode: ClassVar[RefineMode] = "route"
 
@@ -98,7 +99,7 @@ class TopometricPaper(Topometric):
     """The paper's own matching, which is told where the mapping drive began."""
 
     card: ClassVar[Method] = TOPOMETRIC_PAPER
-    needs: ClassVar = Needs(road_network=True, start_pose=True)
+    needs: ClassVar = Needs(road_network=True, start_pose=True, frames_optional=True)
     mode: ClassVar[RefineMode] = "paper"
 
 

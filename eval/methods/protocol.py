@@ -45,23 +45,40 @@ class Needs:
     camera: bool = True  # frames; without them, the observations have none, and none is decoded
     road_network: bool = False
     start_pose: bool = False  # where the mapping drive began, in the network's frame
+    stereo: bool = False  # the right image of a pair beside each frame: observations are ``StereoObservation``
+    size_px: tuple[int, int] | None = None  # width and height that frames have at least
+    grain: bool = False  # surfaces with the grain that trackers of corners live on
+    metric_scale: bool = False  # how many metres a unit of the self-motion has, as ``Given.metres_per_unit``
+    frames_optional: bool = False  # it does with self-motion alone where a drive has no frames
 
     def in_words(self) -> str:
         """What the report says: ``self-motion, frames of one camera, the road network``."""
-        parts = ["self-motion"]
-        parts += ["frames of one camera"] if self.camera else []
+        frames = "stereo pairs" if self.stereo else "frames of one camera"
+        frames += f" of at least {self.size_px[0]}x{self.size_px[1]}" if self.size_px else ""
+        frames += " with grain" if self.grain else ""
+        parts = ["self-motion in metres" if self.metric_scale else "self-motion"]
+        parts += [frames] if self.camera else []
         parts += ["the road network"] if self.road_network else []
         parts += ["the start pose"] if self.start_pose else []
         return ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class StereoObservation(Observation):
+    """What a method that needs stereo pairs is handed: ``frame`` is the left image, ``right`` the other one of the pair."""
+
+    right: Frame | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cost:
     """What a process of its own took, where that is not what our process spent on it."""
 
-    cpu_s: float  # user and system time of all its processes
+    cpu_s: float  # user and system time of all its processes, without its start if it says when it is ready
     peak_rss_bytes: int | None = None  # the most memory that one of its processes held
     step_s: FloatArray | None = None  # (N,) per observation, in s; None if it is not handed them one by one
+    step_cpu_s: FloatArray | None = None  # (N,) the same of CPU time, all threads; None where that cannot be told apart
+    loading_cpu_s: float = 0.0  # what its start took beside ``cpu_s``
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,6 +99,7 @@ class Mapped:
     figures: dict[str, Any] = field(default_factory=dict)  # further fields of its row
     save: Callable[[Path], int] | None = None  # writes its map file and answers with the size in bytes
     cost: Cost | None = None  # if it was measured elsewhere
+    live: Trajectory | None = None  # its poses as it answered them on the way, where ``trajectory`` has later corrections
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,6 +113,8 @@ class Given:
     folder: Path  # an empty folder of its own, for whatever it wants to write
     roads: RoadNetwork | None = None
     start: StartPose | None = None
+    metres_per_unit: float | None = None  # of the speeds
+    frames: bool = True  # whether the drive has any
     base: Mapped | None = None  # the map of the method that it builds on, if it names one in ``builds_on``
     mapped: Mapped | None = None  # for ``localize``: what its own ``map`` returned, or else its ``base``
     concealed: tuple[Path, ...] = ()  # folders with the truth, which a program of its own is not to see

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from hippodrome.core.types import HippodromeError, Observation
+from hippodrome.eval.methods.protocol import StereoObservation
 from hippodrome.eval.metrics.trajectory import path_length_m
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import Recording
@@ -46,3 +47,11 @@ def observations_of(recording: Recording, first: int, end: int) -> Iterator[Obse
     for step in range(first, min(end, len(recording.samples.t_s))):
         number = int(recording.samples.frame[step])
         yield recording.samples.observation(step, recording.frame(number) if number >= 0 else None)
+
+
+def stereo_observations_of(recording: Recording, first: int, end: int) -> Iterator[StereoObservation]:
+    """The same with the right image of each pair. Raises HippodromeError where the recording has none."""
+    for step, one in enumerate(observations_of(recording, first, end), start=first):
+        number = int(recording.samples.frame[step])
+        right = recording.frame(number, "r") if number >= 0 else None
+        yield StereoObservation(one.t_s, one.dt_s, one.speed, one.yaw_rate_radps, one.frame, right)

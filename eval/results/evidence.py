@@ -8,20 +8,21 @@ from collections.abc import Iterable
 from hippodrome._files import write_atomically
 from hippodrome.eval.files.scenarios import effective_configuration
 from hippodrome.eval.files.trajectories import write_tum
-from hippodrome.eval.methods.materials import Materials, Outcome
+from hippodrome.eval.methods.materials import Materials, Outcome, Unscored, truth_of
 
 
-def write_trajectories(materials: Materials, outcomes: Iterable[Outcome]) -> None:
-    """Write the true trajectories, those of all methods, the declared poses of the localizer, and the scenario as it was run.
+def write_trajectories(materials: Materials, outcomes: Iterable[Outcome | Unscored]) -> None:
+    """Write the true trajectories, as far as they are known, those of all methods, the localizers' poses, and the scenario.
 
     They go to the scenario's folder: ``ground-truth.tum``, ``localization-ground-truth.tum``, ``STEM.tum`` and
     ``STEM-localization.tum`` of each method (``semi-metric.tum`` for one), ``scenario.json``.
     """
     folder = materials.folder
-    write_tum(folder / "ground-truth.tum", materials.mapping.ground_truth())
-    write_tum(folder / "localization-ground-truth.tum", materials.drive.ground_truth())
+    for name, drive in (("ground-truth.tum", materials.mapping), ("localization-ground-truth.tum", materials.drive)):
+        if (truth := truth_of(drive)) is not None:
+            write_tum(folder / name, truth)
     for outcome in outcomes:
-        write_tum(folder / f"{outcome.method.stem}.tum", outcome.scored.trajectory)
+        write_tum(folder / f"{outcome.method.stem}.tum", outcome.trajectory)
         declared = outcome.localization.declared() if outcome.localization is not None else None
         if declared is not None:
             write_tum(folder / f"{outcome.method.stem}-localization.tum", declared)

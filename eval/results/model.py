@@ -107,6 +107,7 @@ class Row(_Model):
     method: str  # label of the method, see ``eval.methods.method``
     quoted: bool = False  # copied from a paper, not measured here
     failure: str | None = None  # why it failed, if it did
+    unscored: str | None = None  # why errors are missing that others of its figures have: the truth of a drive is not known
     refused: str | None = None  # why nothing vouches for its map, if nothing does: its errors are those of a guess
     declaration: Declaration | None = None
     cpu_percent: float | None = None  # CPU time of the process, in per cent of the drive's duration

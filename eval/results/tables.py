@@ -194,6 +194,8 @@ def print_table_one(results: Results, quoted: Sequence[Row], console: Console) -
         for row in scenario.rows:
             for line in _complaints(row):
                 console.print(line, markup=False, style="red", highlight=False)
+        for line in unscored_notes(scenario.rows):
+            console.print(line, markup=False, highlight=False)
         if (note := aligned_note(scenario.rows)) is not None:
             console.print(note, markup=False, highlight=False)
     if quoted:
@@ -251,6 +253,15 @@ def row_cells(columns: Sequence[Column], row: Row) -> list[str]:
     return [f"{cells[0]}{mark}", *cells[1:]]
 
 
+def unscored_notes(rows: Sequence[Row]) -> list[str]:
+    """Why errors are missing, a line for each reason, with the methods that it holds for."""
+    methods_of: dict[str, list[str]] = {}
+    for row in rows:
+        if row.unscored is not None:
+            methods_of.setdefault(row.unscored, []).append(row.method)
+    return [f"not scored ({', '.join(methods)}): {reason}" for reason, methods in methods_of.items()]
+
+
 def _complaints(row: Row) -> list[str]:
     """What is wrong with a row, a line each."""
     failed = [f"{row.method}: FAILED: {row.failure}"] if row.failure is not None else []
@@ -268,6 +279,7 @@ def _scenario_markdown(scenario: ScenarioResult, quoted: Sequence[Row]) -> str:
     if localizing := [row for row in rows if row.localization is not None]:
         parts += ["### Localization from an unknown start", "", *_table(LOCALIZATION_COLUMNS, localizing), ""]
     lines = [line for row in rows for line in _complaints(row)]
+    lines += unscored_notes(rows)
     lines += [note] if (note := aligned_note(rows)) is not None else []
     notes = [f"- {markdown.escaped(line)}" for line in (*lines, *failed_runs(rows), *definitions(rows))]
     mark = [f"- {QUOTED_NOTE}"] if any(row.quoted for row in rows) else []

@@ -1,101 +1,95 @@
-"""Runs in the tracker's own environment, by that environment's Python: imports nothing of hippodrome.
+"""The tracker as a program of the stream; runs in its own environment, by that environment's Python, and imports no hippodrome.
 
-    python runner.py JOB.json < frames
+    python runner.py MESSAGES VOCABULARY SETTINGS FOLDER [paced] < stream > stream
 
-The job names vocabulary, settings, width, height, whether to pace the frames, and whether to localize in the map that the
-settings load. Standard input: per frame the time stamp (float64, little endian), then the left and the right image, grey bytes.
-The working directory receives ``live.tum`` (each pose as it was reported when its frame came), ``steps.txt`` (per frame: time
-stamp, whether tracked, whether in the loaded map, CPU seconds so far), after mapping also ``final.tum`` and ``keyframes.tum``
-(after all optimisation), and at the very end ``result.json``: without it the run did not end well.
+MESSAGES is the module that ``proto/method_stream.proto`` was compiled to. In FOLDER, which becomes the working directory, the
+tracker saves its map and loads it from. After mapping there are ``final.tum`` and ``keyframes.tum``, the tracker's own
+trajectories of its camera after all optimisation; ``own.json`` has what it took, without loading and saving.
 
 To localize, the tracker maps until its map has merged with the loaded one, and from then on tracks in that map alone. If it were
 in localization mode from the first frame on, it would search its own new and empty map only.
 """
 
+import importlib.util
 import json
+import os
 import resource
 import sys
 import time
+from math import atan2, cos, sin
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any
 
 import numpy as np
+from google.protobuf.proto import parse_length_prefixed, serialize_length_prefixed
 from pyorbslam3 import Sensor, Slam
 
 SETTLE_S = 5.0  # time at the end for local mapping and loop closing, which lag behind the tracker
+GREY = np.array([0.299, 0.587, 0.114])  # weights of red, green and blue
 
 
 def main() -> None:
-    """Track every frame of standard input, save, report."""
-    job = json.loads(Path(sys.argv[1]).read_text())
-    slam = Slam(job["vocabulary"], job["settings"], Sensor.STEREO, use_viewer=False)
+    """Answer the messages of one drive, save, report."""
+    messages, vocabulary, settings, folder, *paced = sys.argv[1:]
+    source: Any = sys.stdin.buffer
+    sink: Any = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what the tracker prints goes to the log
+    os.chdir(folder)  # it takes the names of map files without a folder only
+    spec = importlib.util.spec_from_file_location("method_stream_pb2", messages)
+    assert spec is not None
+    assert spec.loader is not None
+    pb = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(pb)
+
+    def asked() -> Any:
+        return parse_length_prefixed(pb.ToMethod, source)
+
+    def answer(**message: Any) -> None:
+        serialize_length_prefixed(pb.FromMethod(**message), sink)
+        sink.flush()
+
+    begin = asked().begin
+    localizes, ahead_m = begin.phase == pb.Begin.LOCALIZE, begin.camera.ahead_of_rear_axle_m
+    slam = Slam(vocabulary, settings, Sensor.STEREO, use_viewer=False)
     loaded_s, began = cpu_s(), time.monotonic()
-    live: list[str] = []
-    steps: list[str] = []
-    first_t_s, longest_s, merged = None, 0.0, False
-    while (pair := read_pair(sys.stdin.buffer, job["width"], job["height"])) is not None:
-        t_s, left, right = pair
-        first_t_s = t_s if first_t_s is None else first_t_s
-        if job["paced"]:
-            time.sleep(max(0.0, began + t_s - first_t_s - time.monotonic()))
-        asked = time.monotonic()
-        result = slam.track_stereo(left, right, t_s)
-        longest_s = max(longest_s, time.monotonic() - asked)
-        steps.append(f"{t_s!r} {int(result.ok)} {int(merged)} {cpu_s() - loaded_s:.6f}")
-        if result.ok:
-            live.append(tum_line(t_s, np.asarray(result.pose_wc, dtype=np.float64)))
-        if job["localize"] and not merged and slam.map_changed() and len(steps) > 1:
+    answer(ready=pb.Ready(version=1))
+    merged, frames, tracked, first_t_s = False, 0, 0, None
+    while (message := asked()).WhichOneof("message") == "observation":
+        one = message.observation
+        if not one.right_pixels:
+            answer(answer=pb.Answer())
+            continue
+        first_t_s = one.t_s if first_t_s is None else first_t_s
+        if paced:
+            time.sleep(max(0.0, began + one.t_s - first_t_s - time.monotonic()))
+        result = slam.track_stereo(grey(one, one.pixels), grey(one, one.right_pixels), one.t_s)
+        frames, tracked = frames + 1, tracked + int(result.ok)
+        known = result.ok and (merged or not localizes)
+        pose = body_pose(np.asarray(result.pose_wc, dtype=np.float64), ahead_m) if result.ok else (0.0, 0.0, 0.0)
+        if localizes and not merged and slam.map_changed() and frames > 1:
             merged = True  # from the next frame on, poses are the loaded map's
             slam.activate_localization_mode()
-    if not job["localize"]:
+        answer(answer=pb.Answer(known=known, pose=pb.Pose(x=pose[0], y=pose[1], heading_rad=pose[2])))
+    if not localizes:
         time.sleep(SETTLE_S)
-    tracked_s, wall_s, memory = cpu_s(), time.monotonic() - began, peak_rss_bytes()
+    Path("own.json").write_text(json.dumps({"cpu_s": cpu_s() - loaded_s, "peak_rss_bytes": peak_rss_bytes()}) + "\n")
     slam.shutdown()
-    Path("live.tum").write_text("\n".join(live) + "\n")
-    Path("steps.txt").write_text("\n".join(steps) + "\n")
-    if live and not job["localize"]:
+    if tracked and not localizes:
         slam.save_trajectory_tum("final.tum")
         slam.save_keyframe_trajectory_tum("keyframes.tum")
-    atlas = [] if job["localize"] else sorted(Path().glob("*.osa"))
-    report = {
-        "frames": len(steps),
-        "tracked": len(live),
-        "cpu_s": tracked_s - loaded_s,
-        "loading_cpu_s": loaded_s,
-        "wall_s": wall_s,
-        "longest_frame_s": longest_s,
-        "peak_rss_bytes": memory,
-        "map_bytes": atlas[0].stat().st_size if atlas else None,
-    }
-    Path("result.json").write_text(json.dumps(report, indent=1) + "\n")
+    answer(finished=pb.Finished())
 
 
-def read_pair(stream: BinaryIO, width: int, height: int) -> tuple[float, np.ndarray, np.ndarray] | None:
-    """The next time stamp and pair of grey images (H, W); None at the end."""
-    size = width * height
-    data = stream.read(8 + 2 * size)
-    if len(data) < 8 + 2 * size:
-        return None
-    images = np.frombuffer(data, np.uint8, 2 * size, offset=8).reshape(2, height, width)
-    return float(np.frombuffer(data, "<f8", 1)[0]), images[0].copy(), images[1].copy()
+def grey(one: Any, pixels: bytes) -> np.ndarray:
+    """A grey image (H, W) of an observation."""
+    image = np.frombuffer(pixels, np.uint8).reshape(one.height, one.width, one.channels)
+    return image[:, :, 0].copy() if one.channels == 1 else (image @ GREY).astype(np.uint8)
 
 
-def tum_line(t_s: float, pose: np.ndarray) -> str:
-    """``t x y z qx qy qz qw`` of a pose (4, 4)."""
-    x, y, z = (float(value) for value in pose[:3, 3])
-    return " ".join(repr(value) for value in (t_s, x, y, z, *quaternion(pose[:3, :3])))
-
-
-def quaternion(r: np.ndarray) -> tuple[float, float, float, float]:
-    """Quaternion (x, y, z, w) of a rotation (3, 3): an eigenvector of Bar-Itzhack's matrix, stable at every angle."""
-    k = np.array([
-        [r[0, 0] - r[1, 1] - r[2, 2], r[1, 0] + r[0, 1], r[2, 0] + r[0, 2], r[2, 1] - r[1, 2]],
-        [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], r[2, 1] + r[1, 2], r[0, 2] - r[2, 0]],
-        [r[2, 0] + r[0, 2], r[2, 1] + r[1, 2], r[2, 2] - r[0, 0] - r[1, 1], r[1, 0] - r[0, 1]],
-        [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], r[0, 0] + r[1, 1] + r[2, 2]],
-    ])  # fmt: skip
-    x, y, z, w = np.linalg.eigh(k)[1][:, -1]
-    return float(x), float(y), float(z), float(w)
+def body_pose(camera: np.ndarray, ahead_m: float) -> tuple[float, float, float]:
+    """Pose of the rear axle in the plane, of that of the camera (4, 4), whose world has x to the right, y down, z ahead."""
+    heading = atan2(-camera[0, 2], camera[2, 2])
+    return float(camera[2, 3] - ahead_m * cos(heading)), float(-camera[0, 3] - ahead_m * sin(heading)), heading
 
 
 def cpu_s() -> float:

@@ -23,8 +23,8 @@ from hippodrome.eval.methods.method import (
 )
 from hippodrome.eval.report.evidence import add_layers
 from hippodrome.eval.results.table_two import LocalizedSequence
-from hippodrome.eval.rivals.orbslam3.rows import tum_path
-from hippodrome.eval.rivals.orbslam3.stage import Tracked
+from hippodrome.eval.trials.rivals.spread import tum_path
+from hippodrome.eval.trials.rivals.stage import Tracked
 
 OF_THE_EVALUATION: Final = (DEAD_RECKONING, SEMI_METRIC, RATSLAM, *REFINED)  # in the order of its figures
 

@@ -19,10 +19,10 @@ from hippodrome.eval.results.table_two import LocalizedSequence, write_table_two
 from hippodrome.eval.results.tables import failed_runs, print_table_one, table_one_markdown
 from hippodrome.eval.results.terminal import PlainConsole
 from hippodrome.eval.rivals.memory import with_peak_rss
-from hippodrome.eval.rivals.orbslam3.stage import Tracked, TrackerOptions, locate, track
 from hippodrome.eval.rivals.sequences import localize_sequences
 from hippodrome.eval.run import RESULTS, evaluate, load_scenarios
 from hippodrome.eval.trials.rivals.comparison import draw_comparison, draw_sequences
+from hippodrome.eval.trials.rivals.stage import Tracked, TrackerOptions, locate, track
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario
 

@@ -7,7 +7,7 @@ import pytest
 
 from hippodrome.eval.contest.entry import Added, entries_of, with_methods
 from hippodrome.eval.contest.perform import perform
-from hippodrome.eval.contest.process import can_conceal
+from hippodrome.eval.programs.process import can_conceal
 from hippodrome.sim.method_spec import MethodSpec
 
 INTEGRATE = """\

@@ -13,11 +13,11 @@ from hippodrome.eval.methods.method import ORBSLAM3_FINAL, ORBSLAM3_LIVE
 from hippodrome.eval.metrics.localization import FALSE_FIX_M
 from hippodrome.eval.report.evidence import MapEvidence, read_map_evidence
 from hippodrome.eval.results.table_two import LocalizedSequence, SequenceRow
-from hippodrome.eval.rivals.orbslam3.rows import tum_path
-from hippodrome.eval.rivals.orbslam3.stage import Tracked
-from hippodrome.eval.rivals.orbslam3.tracker import Run
 from hippodrome.eval.trials.rivals import comparison
 from hippodrome.eval.trials.rivals.comparison import draw_comparison, draw_sequences
+from hippodrome.eval.trials.rivals.kept import Run
+from hippodrome.eval.trials.rivals.spread import tum_path
+from hippodrome.eval.trials.rivals.stage import Tracked
 
 LIVE, FINAL = ORBSLAM3_LIVE.label, ORBSLAM3_FINAL.label
 T_S = 0.1 * np.arange(400)

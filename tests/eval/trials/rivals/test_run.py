@@ -6,6 +6,7 @@ import pytest
 
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE
+from hippodrome.eval.programs.environments import NotInstalled
 from hippodrome.eval.results.model import (
     Network,
     Results,
@@ -14,9 +15,7 @@ from hippodrome.eval.results.model import (
     read_results,
     write_results,
 )
-from hippodrome.eval.rivals.orbslam3 import stage
-from hippodrome.eval.rivals.orbslam3.environment import NotInstalled
-from hippodrome.eval.trials.rivals import run
+from hippodrome.eval.trials.rivals import run, stage
 
 SCENARIO = "name: hamlet\ntown: {kind: grid, width_m: 150, height_m: 150, road_km: 0.9}\nmapping: {tour: {length_m: 120}}\n"
 
@@ -32,11 +31,11 @@ def scenario(tmp_path, monkeypatch):
         write_results(out / "results.json", Results(scenarios=(result,)))
         return True
 
-    def ensure_environment(folder):
+    def install():
         raise NotInstalled("installing pyorbslam3 failed: no wheel for this machine")
 
     monkeypatch.setattr(run, "evaluate", evaluate)
-    monkeypatch.setattr(stage, "ensure_environment", ensure_environment)
+    monkeypatch.setattr(stage.RIVAL, "install", install)
     monkeypatch.setattr(run, "gather", lambda scenario, out: None)
     monkeypatch.setattr(run, "with_peak_rss", lambda results, scenario, out, pool: results)
     monkeypatch.setattr(run, "localize_sequences", lambda materials: [])
@@ -76,7 +75,7 @@ def test_a_quick_look_leaves_the_evaluation_alone(scenario, tmp_path, capsys):
 
 
 def test_no_frames_is_bad_input(scenario, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(stage, "ensure_environment", lambda folder: folder / "bin" / "python")
+    monkeypatch.setattr(stage.RIVAL, "install", lambda: None)
     status = main(["baselines", str(scenario), "--out", str(tmp_path / "out"), "--workers", "1", "--seconds", "0.01"])
     assert status == BAD_INPUT
     assert "--seconds 0.01" in capsys.readouterr().err

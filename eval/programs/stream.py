@@ -14,8 +14,9 @@ from google.protobuf.message import DecodeError
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import Observation, Trajectory
-from hippodrome.eval.contest.process import POLL_S, Limits, Process, command_words, last_words, started
-from hippodrome.eval.methods.protocol import Answer, Cost, Given, Localized, Mapped, MethodError
+from hippodrome.eval.methods.protocol import Answer, Cost, Given, Localized, Mapped, MethodError, StereoObservation
+from hippodrome.eval.programs.environments import words_of
+from hippodrome.eval.programs.process import POLL_S, Limits, Process, last_words, started
 from hippodrome.proto import method_stream_pb2 as pb
 from hippodrome.sim.method_spec import MethodSpec
 
@@ -38,12 +39,10 @@ class StreamMapper:
         if finished.trajectory:
             t_s = np.array([one.t_s for one in finished.trajectory])
             poses = np.array([_pose(one.pose) for one in finished.trajectory])
-            return Mapped(Trajectory(t_s, poses), cost=cost)
-        known = [(t_s, *_pose(answer.pose)) for t_s, answer in zip(times_s, answers, strict=True) if answer.known]
-        if not known:
+            return Mapped(Trajectory(t_s, poses), cost=cost, live=_on_the_way(times_s, answers))
+        if (live := _on_the_way(times_s, answers)) is None:
             raise MethodError("none of its answers has a pose, and its last message has no trajectory")
-        table = np.array(known)
-        return Mapped(Trajectory(table[:, 0], table[:, 1:]), cost=cost)
+        return Mapped(live, cost=cost, live=live)
 
     def _run(
         self, command: str, phase: pb.Begin.Phase, observations: Iterator[Observation], given: Given
@@ -51,23 +50,28 @@ class StreamMapper:
         """One drive, from Begin to Finished: times, answers, the last message, and what it cost."""
         folder = given.folder / "kept"
         folder.mkdir(exist_ok=True)
-        times_s, answers, steps_s = [], [], []
-        with started(command_words(command), given.folder, Limits.of(self._spec), given.concealed, fed=True) as process:
+        times_s, answers, steps_s, cpu_s = [], [], [], []
+        words = words_of(self._spec, command)
+        with started(words, given.folder, Limits.of(self._spec), given.concealed, fed=True) as process:
             line = _Line(process)
             ready = line.asked(pb.ToMethod(begin=_begin(phase, given, folder)), "ready").ready
             if ready.version != VERSION:
                 raise MethodError(f"it speaks version {ready.version} of the stream, this harness version {VERSION}")
+            loading_s = process.cpu_now_s()
             for observation in observations:
                 message = pb.ToMethod(observation=_observation(observation))
                 began = time.perf_counter()
                 answers.append(line.asked(message, "answer").answer)
                 steps_s.append(time.perf_counter() - began)
+                cpu_s.append(process.cpu_now_s())
                 times_s.append(observation.t_s)
             finished = line.asked(pb.ToMethod(end=pb.End()), "finished").finished
             process.look()
             line.close()
             process.wait()
-        return times_s, answers, finished, Cost(process.cpu_s, process.peak_rss_bytes, np.array(steps_s))
+        step_cpu_s = np.diff(cpu_s, prepend=loading_s)
+        cost = Cost(process.cpu_s - loading_s, process.peak_rss_bytes, np.array(steps_s), step_cpu_s, loading_s)
+        return times_s, answers, finished, cost
 
 
 class StreamLocalizer(StreamMapper):
@@ -78,6 +82,13 @@ class StreamLocalizer(StreamMapper):
         assert self._spec.localize is not None
         times_s, answers, _, cost = self._run(self._spec.localize, pb.Begin.LOCALIZE, observations, given)
         return Localized([_answer(t_s, answer) for t_s, answer in zip(times_s, answers, strict=True)], cost)
+
+
+def _on_the_way(times_s: list[float], answers: list[pb.Answer]) -> Trajectory | None:
+    """The poses of the answers that have one; None if none has."""
+    known = [(t_s, *_pose(answer.pose)) for t_s, answer in zip(times_s, answers, strict=True) if answer.known]
+    table = np.array(known)
+    return Trajectory(table[:, 0], table[:, 1:]) if known else None
 
 
 class _Line:
@@ -147,7 +158,7 @@ class _Line:
             self._looked_s = now_s
             self._process.poll()
             if (cause := self._process.failure()) is not None:
-                raise MethodError(cause)
+                raise self._process.error(cause)
 
     def _message(self) -> bytes | None:
         """The next whole message that has arrived."""
@@ -176,7 +187,7 @@ class _Line:
         while not self._process.poll() and time.monotonic() < end_s:
             time.sleep(POLL_S / 10.0)
         cause = self._process.failure()
-        raise MethodError(cause or f"it ended before the drive did; its last words: {last_words(self._process.log)}")
+        raise self._process.error(cause or f"it ended before the drive did; its last words: {last_words(self._process.log)}")
 
 
 def _varint(value: int) -> bytes:
@@ -196,8 +207,11 @@ def _begin(phase: pb.Begin.Phase, given: Given, folder: Path) -> pb.Begin:
         rate_hz=given.camera.rate_hz,
         ahead_of_rear_axle_m=given.camera.forward_m,
         height_m=given.camera.height_m,
+        baseline_m=given.camera.stereo_baseline_m or 0.0,
     )
     message = pb.Begin(version=VERSION, phase=phase, camera=camera, rate_hz=given.rate_hz, seed=given.seed, folder=str(folder))
+    if given.metres_per_unit is not None:
+        message.metres_per_unit = given.metres_per_unit
     if given.start is not None:
         message.start.CopyFrom(pb.Pose(x=given.start.x_m, y=given.start.y_m, heading_rad=given.start.heading_rad))
     if given.roads is not None:
@@ -217,6 +231,8 @@ def _observation(one: Observation) -> pb.Observation:
         message.height, message.width = one.frame.shape[:2]
         message.channels = 1 if one.frame.ndim == 2 else 3
         message.pixels = one.frame.tobytes()
+        if isinstance(one, StereoObservation) and one.right is not None:
+            message.right_pixels = one.right.tobytes()
     return message
 
 

@@ -1,7 +1,7 @@
-"""A virtual environment for the tracker alone, so that its licence, its crashes and its packages stay out of ours.
+"""Virtual environments for programs alone, so that their licences, their crashes and their packages stay out of ours.
 
-It lies in the user's cache, not among the results: a folder of results may come from somebody else, and what is in the
-environment is run. Its packages are those that ``REQUIREMENTS`` names, to the last byte.
+They lie in the user's cache, not among the results: a folder of results may come from somebody else, and what is in an
+environment is run. The packages of one are those that its requirements name, to the last byte.
 """
 
 from __future__ import annotations
@@ -14,50 +14,74 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from hippodrome._files import read_bounded
 from hippodrome._folders import temporary_folder
 from hippodrome._processes import dying_with_me
-from hippodrome.core.types import HippodromeError
+from hippodrome.eval.methods.protocol import MethodError
+from hippodrome.eval.programs.process import command_words
+from hippodrome.sim.method_spec import MethodSpec
 
-# The wheels of CPython 3.11, 3.12 and 3.13 on x86_64; there are no others of the tracker. NumPy's version is constraints.txt's.
-REQUIREMENTS: Final = """\
-pyorbslam3==0.1.1 \\
-    --hash=sha256:dbbc0ae582b0aec75dd02935b19873dce23c3899e25ee358d58b66c80ea81288 \\
-    --hash=sha256:5566ee8a36bbc262dd62f8d27256d4b19d9ea54ad8beb9e16c93ae544f7c1746 \\
-    --hash=sha256:daa786c8dcd86122bdbf1072733fa1ac5a7b306e220de25580c932662b994be0
-numpy==2.4.6 \\
-    --hash=sha256:89cd468399cfd2504718f0ba50e410dca55a170b61a02ad92bb18c8a65186e93 \\
-    --hash=sha256:90f9849678c75fe7afa2d348ac842c168b0a4d3d61919687216dfc547976d853 \\
-    --hash=sha256:a7830bab239b79cda9c08c2da014761cafb48da6150e1da17ac06283f43b6089
-"""
 INSTALL_LIMIT_S = 600.0
 READY = ".ready"  # file that says that the environment is complete
 
 
-class NotInstalled(HippodromeError):
-    """The tracker cannot be installed here; the message says why."""
+MAX_REQUIREMENTS_BYTES: Final = 1 << 20
 
 
-def environment_folder() -> Path:
-    """Where the environment lies: in the user's cache, by what is in it. Raises NotInstalled where there is no such cache."""
+class NotInstalled(MethodError):
+    """An environment cannot be made here; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """What an environment is called, and what is in it."""
+
+    name: str
+    requirements: str  # of pip, each with its hashes; others are refused
+    imported: str | None = None  # a module whose import shows that all works
+
+    def python(self) -> Path:
+        """Its Python. The environment is made if it is not there yet. Raises NotInstalled."""
+        return ensure_environment(self, environment_folder(self))
+
+
+def words_of(spec: MethodSpec, command: str, **places: Path) -> list[str]:
+    """The words of a program's command, with folders and the Python of its environment in their places. Raises MethodError."""
+    if spec.environment is None:
+        return command_words(command, **places)
+    try:
+        requirements = read_bounded(spec.environment, MAX_REQUIREMENTS_BYTES).decode("utf-8")
+    except (OSError, ValueError) as error:
+        raise NotInstalled(f"environment {spec.environment}: cannot be read: {error}") from None
+    return command_words(command, python=Environment(spec.environment.stem, requirements).python(), **places)
+
+
+def user_cache() -> Path:
+    """The user's cache. Raises NotInstalled where there is none."""
     named = os.environ.get("XDG_CACHE_HOME", "")
     try:
-        cache = Path(named) if Path(named).is_absolute() else Path.home() / ".cache"  # the standard lets ignore a relative one
+        return Path(named) if Path(named).is_absolute() else Path.home() / ".cache"  # the standard lets ignore a relative one
     except RuntimeError as error:
         raise NotInstalled(f"there is no folder for the environment: {error}; set XDG_CACHE_HOME") from None
-    key = hashlib.sha256(f"{REQUIREMENTS}{sys.executable}{sys.version}".encode()).hexdigest()[:12]
-    return cache / "hippodrome" / f"orb-slam3-{key}"
 
 
-def ensure_environment(folder: Path) -> Path:
+def environment_folder(environment: Environment) -> Path:
+    """Where an environment lies: in the user's cache, by what is in it. Raises NotInstalled where there is no such cache."""
+    key = hashlib.sha256(f"{environment.requirements}{sys.executable}{sys.version}".encode()).hexdigest()[:12]
+    return user_cache() / "hippodrome" / f"{environment.name}-{key}"
+
+
+def ensure_environment(environment: Environment, folder: Path) -> Path:
     """The Python of the environment in ``folder``, which is made if it is not there. Raises NotInstalled."""
     python = folder / "bin" / "python"
     with _alone(folder.parent):
         if not (folder / READY).exists():
             _run([sys.executable, "-m", "venv", "--clear", str(folder)], "making the virtual environment")
-            _install(python)
+            _install(environment, python)
             folder.chmod(0o700)  # a lax umask lets a group write below it
             (folder / READY).touch()
         for place in (folder.parent, folder):
@@ -65,14 +89,16 @@ def ensure_environment(folder: Path) -> Path:
     return python.absolute()
 
 
-def _install(python: Path) -> None:
+def _install(environment: Environment, python: Path) -> None:
     """Install the packages, each only if it has the hash that is expected; wheels only, so that nothing is built."""
     with temporary_folder() as folder:
         requirements = folder / "requirements.txt"
-        requirements.write_text(REQUIREMENTS, encoding="utf-8")
+        requirements.write_text(environment.requirements, encoding="utf-8")
         quiet = ["--quiet", "--disable-pip-version-check", "--no-input", "--require-hashes", "--only-binary", ":all:"]
-        _run([str(python), "-m", "pip", "install", *quiet, "--requirement", str(requirements)], "installing pyorbslam3")
-    _run([str(python), "-c", "import pyorbslam3"], "importing pyorbslam3")
+        command = [str(python), "-m", "pip", "install", *quiet, "--requirement", str(requirements)]
+        _run(command, f"installing {environment.imported or f'the requirements of {environment.name}'}")
+    if environment.imported is not None:
+        _run([str(python), "-c", f"import {environment.imported}"], f"importing {environment.imported}")
 
 
 @contextmanager

@@ -13,8 +13,8 @@ import cv2
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import Frame, HippodromeError, Observation
-from hippodrome.eval.contest.bags import Mcap, Rosbag2
-from hippodrome.eval.methods.protocol import Given
+from hippodrome.eval.methods.protocol import Given, StereoObservation
+from hippodrome.eval.programs.bags import Mcap, Rosbag2
 from hippodrome.sim.method_spec import Layout
 from hippodrome.sim.recording import PNG_LEVEL
 
@@ -28,7 +28,8 @@ def write_sequence(observations: Iterable[Observation], given: Given, layout: La
     """Write a drive; the times of all observations.
 
     Beside the frames in their layout there are ``odometry.csv`` and ``camera.json``, and what the method needs: ``roads.csv``
-    with the lanes' centrelines, ``start.txt`` with the pose at which the drive began (x_m y_m heading_rad).
+    with the lanes' centrelines, ``start.txt`` with the pose at which the drive began (x_m y_m heading_rad),
+    ``metres_per_unit.txt`` with the length of the speeds' unit.
 
     Raises:
         HippodromeError: The disk is full.
@@ -44,7 +45,7 @@ def write_sequence(observations: Iterable[Observation], given: Given, layout: La
             times_s.append(one.t_s)
             frames.motion(one)
             if one.frame is not None:
-                frames.add(one.t_s, one.frame)
+                frames.add(one.t_s, one.frame, one.right if isinstance(one, StereoObservation) else None)
     camera = given.camera
     calibration = {
         "width": camera.width,
@@ -54,6 +55,7 @@ def write_sequence(observations: Iterable[Observation], given: Given, layout: La
         "rate_hz": camera.rate_hz,
         "ahead_of_rear_axle_m": camera.forward_m,
         "height_m": camera.height_m,
+        **({} if camera.stereo_baseline_m is None else {"baseline_m": camera.stereo_baseline_m}),
     }
     (folder / "camera.json").write_text(json.dumps(calibration, indent=1) + "\n", encoding="utf-8")
     if given.roads is not None:
@@ -61,6 +63,8 @@ def write_sequence(observations: Iterable[Observation], given: Given, layout: La
     if given.start is not None:
         start = given.start
         (folder / "start.txt").write_text(f"{start.x_m!r} {start.y_m!r} {start.heading_rad!r}\n", encoding="utf-8")
+    if given.metres_per_unit is not None:
+        (folder / "metres_per_unit.txt").write_text(f"{given.metres_per_unit!r}\n", encoding="utf-8")
     return times_s
 
 
@@ -90,8 +94,8 @@ class _Frames(ABC):
         """Speed and yaw rate, for the layouts that have them beside the frames; ``odometry.csv`` has them for all."""
 
     @abstractmethod
-    def add(self, t_s: float, frame: Frame) -> None:
-        """Write the frame that was taken at ``t_s``, and list it."""
+    def add(self, t_s: float, frame: Frame, right: Frame | None) -> None:
+        """Write the frame that was taken at ``t_s``, with the right one of a pair where there is one, and list it."""
 
 
 class _Tum(_Frames):
@@ -100,7 +104,7 @@ class _Tum(_Frames):
         (folder / "rgb").mkdir()
         self._list = self.listing(folder / "rgb.txt", "# t_s filename\n")
 
-    def add(self, t_s: float, frame: Frame) -> None:
+    def add(self, t_s: float, frame: Frame, right: Frame | None) -> None:
         name = f"rgb/{t_s:.6f}.png"
         _write_png(self.folder / name, frame)
         self._list.write(f"{t_s!r} {name}\n")
@@ -109,13 +113,22 @@ class _Tum(_Frames):
 class _Euroc(_Frames):
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
-        (folder / "mav0/cam0/data").mkdir(parents=True)
-        self._list = self.listing(folder / "mav0/cam0/data.csv", "#timestamp [ns],filename\n")
+        self._lists = {"cam0": self._camera("cam0")}
 
-    def add(self, t_s: float, frame: Frame) -> None:
-        stamp = round(t_s * NANOSECONDS)
-        _write_png(self.folder / f"mav0/cam0/data/{stamp}.png", frame)
-        self._list.write(f"{stamp},{stamp}.png\n")
+    def add(self, t_s: float, frame: Frame, right: Frame | None) -> None:
+        for camera, image in zip(("cam0", "cam1"), (frame, right), strict=True):
+            if image is not None:
+                self._picture(camera, round(t_s * NANOSECONDS), image)
+
+    def _picture(self, camera: str, stamp: int, image: Frame) -> None:
+        if camera not in self._lists:
+            self._lists[camera] = self._camera(camera)
+        _write_png(self.folder / "mav0" / camera / f"data/{stamp}.png", image)
+        self._lists[camera].write(f"{stamp},{stamp}.png\n")
+
+    def _camera(self, camera: str) -> IO[str]:
+        (self.folder / "mav0" / camera / "data").mkdir(parents=True)
+        return self.listing(self.folder / "mav0" / camera / "data.csv", "#timestamp [ns],filename\n")
 
 
 class _Kitti(_Frames):
@@ -124,8 +137,11 @@ class _Kitti(_Frames):
         (folder / "image_2").mkdir()
         self._list = self.listing(folder / "times.txt")
 
-    def add(self, t_s: float, frame: Frame) -> None:
+    def add(self, t_s: float, frame: Frame, right: Frame | None) -> None:
         _write_png(self.folder / f"image_2/{self.count:06d}.png", frame)
+        if right is not None:
+            (self.folder / "image_3").mkdir(exist_ok=True)
+            _write_png(self.folder / f"image_3/{self.count:06d}.png", right)
         self._list.write(f"{t_s!r}\n")
         self.count += 1
 
@@ -146,7 +162,7 @@ class _Bag(_Frames):
     def motion(self, one: Observation) -> None:
         self._bag.motion(one)
 
-    def add(self, t_s: float, frame: Frame) -> None:
+    def add(self, t_s: float, frame: Frame, right: Frame | None) -> None:
         self._bag.picture(t_s, _png(frame))
 
 

@@ -1,43 +1,30 @@
-"""ORB-SLAM3's part of ``hippodrome baselines``: stereo pairs, vocabulary, mapping runs, sequences in the median run's map."""
+"""A method that needs drives of its own and several runs: stereo pairs, mapping runs, sequences in the median run's map."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
+from typing import Final
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.methods.method import ORBSLAM3_FINAL, ORBSLAM3_LIVE
+from hippodrome.eval.methods.protocol import MethodError, Needs
 from hippodrome.eval.pool import Workers, process_pool
+from hippodrome.eval.programs.pairs import StereoDrive, draw_pairs, missing_chunks, stereo_drive
 from hippodrome.eval.results.model import Row
 from hippodrome.eval.results.table_two import LocalizedSequence, SequenceRow, failed_sequence
-from hippodrome.eval.rivals.orbslam3.environment import NotInstalled, ensure_environment, environment_folder
-from hippodrome.eval.rivals.orbslam3.pairs import (
-    StereoDrive,
-    draw_pairs,
-    missing_chunks,
-    stereo_drive,
-)
-from hippodrome.eval.rivals.orbslam3.relocalize import (
-    empty_rows,
-    map_alignment,
-    score_sequence,
-    sequence_task,
-)
-from hippodrome.eval.rivals.orbslam3.rows import failed_rows, median_run, rows
-from hippodrome.eval.rivals.orbslam3.tracker import (
-    Run,
-    RunTask,
-    own_fault,
-    run_tracker,
-)
+from hippodrome.eval.rivals.orbslam3.method import OrbSlam3
 from hippodrome.eval.rivals.orbslam3.training import VocabularyTask, train_vocabulary
+from hippodrome.eval.trials.rivals.kept import Run, RunTask, own_fault, run_kept
+from hippodrome.eval.trials.rivals.saved_map import empty_rows, map_alignment, score_sequence, sequence_task
+from hippodrome.eval.trials.rivals.spread import Cards, median_run, rows
 from hippodrome.sim.record import ROLES, RecordingPlan, prepare
 from hippodrome.sim.scenario import Scenario
 
-# Size and baseline are about those of the published car data sets. Grain gives a street's surface the corners that the tracker
-# needs. Without supersampling: drawing at twice the size takes twice the time and gained less than two runs differ by.
-STEREO = {"width": 640, "height": 480, "stereo_baseline_m": 0.5, "grain": True, "supersample": 1}
-TRACKER_BYTES = 7_000_000_000  # memory of one run: up to 6.6 GB late in the paper's drive, when global bundle adjustments overlap
+RIVAL: Final = OrbSlam3
+CARDS: Final = Cards(ORBSLAM3_LIVE, ORBSLAM3_FINAL)
+BASELINE_M: Final = 0.5  # of stereo pairs: about that of the published car data sets
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,13 +47,18 @@ class Tracked:
     task: RunTask | None = None  # what ``final`` was asked for
 
 
-def stereo_scenario(scenario: Scenario) -> Scenario:
-    """The same drives seen by a stereo camera at the odometry's rate, as the tracker needs frames that overlap.
+def seen_as_needed(scenario: Scenario, needs: Needs) -> Scenario:
+    """The same drives seen by the camera that a method needs, at the odometry's rate: trackers need frames that overlap.
 
-    Town, tour, traffic and seed do not depend on the camera, so the drive is the same to the last bit.
+    Town, tour, traffic and seed do not depend on the camera, so the drive is the same to the last bit. Without supersampling:
+    drawing at twice the size takes twice the time and gained ORB-SLAM3 less than two runs of it differ by.
     """
-    camera = scenario.camera.model_copy(update={**STEREO, "rate_hz": scenario.odometry_rate_hz})
-    return scenario.model_copy(update={"camera": camera})
+    width, height = needs.size_px or (scenario.camera.width, scenario.camera.height)
+    baseline_m = BASELINE_M if needs.stereo else None
+    seen = {"width": width, "height": height, "stereo_baseline_m": baseline_m, "grain": needs.grain, "supersample": 1}
+    return scenario.model_copy(
+        update={"camera": scenario.camera.model_copy(update={**seen, "rate_hz": scenario.odometry_rate_hz})}
+    )
 
 
 def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers) -> Tracked:
@@ -82,20 +74,21 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
         pool: Processes that draw the stereo pairs, and the progress display.
     """
     try:
-        python = ensure_environment(environment_folder())
-    except NotInstalled as error:
-        return Tracked(failed_rows(f"not run: {error}"))
+        RIVAL.install()
+    except MethodError as error:
+        return Tracked(CARDS.failed(f"not run: {error}"))
     drive, vocabulary = _prepared(scenario, out, options.seconds, pool)
     key = drive.folder.name.rpartition("-")[2]  # another recording, another run: nothing stale is read back
     how = f"{key}-{drive.frames}-frames{'-paced' if options.paced else ''}"
     folders = [out / scenario.name / "orb-slam3" / how / f"run-{number}" for number in range(options.runs + 1)]
-    *tasks, spare = [RunTask(python, vocabulary, drive, folder, options.paced, options.limit_s) for folder in folders]
+    method = RIVAL(RIVAL.Config(vocabulary=vocabulary, paced=options.paced, time_limit_s=options.limit_s))
+    *tasks, spare = [RunTask(method, drive, folder, scenario.seed) for folder in folders]
     spares = iter([spare])
-    print(f"ORB-SLAM3: {options.runs} runs of {drive.frames:,} stereo pairs", flush=True)
+    print(f"{RIVAL.label}: {options.runs} runs of {drive.frames:,} stereo pairs", flush=True)
     with process_pool(_side_by_side(options.runs, pool)) as executor:
         several = replace(pool, executor=executor)
-        runs = several.run("track", run_tracker, tasks, follow=lambda run: next(spares, None) if own_fault(run) else None)
-    found = rows(runs, drive)
+        runs = several.run("track", run_kept, tasks, follow=lambda run: next(spares, None) if own_fault(run) else None)
+    found = rows(CARDS, runs, drive)
     if any(row.failure is not None for row in found):
         return Tracked(found)
     by_name = {run.folder.name: run for run in runs}
@@ -106,7 +99,7 @@ def track(scenario: Scenario, out: Path, options: TrackerOptions, pool: Workers)
 def _side_by_side(runs: int, pool: Workers) -> int:
     """How many runs at once: as many as the pool has processes, as far as memory has room for them."""
     available_bytes = 1024 * int(Path("/proc/meminfo").read_text().split("MemAvailable:")[1].split()[0])
-    return max(1, min(runs, pool.processes, available_bytes // TRACKER_BYTES))
+    return max(1, min(runs, pool.processes, available_bytes // RIVAL.takes_bytes))
 
 
 def locate(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> list[LocalizedSequence]:
@@ -118,14 +111,14 @@ def locate(scenario: Scenario, out: Path, tracked: Tracked, pool: Workers) -> li
         tracked: What ``track`` returned. Without a map, all sequences fail.
         pool: Processes that run the tracker.
     """
-    wanted = empty_rows()
+    wanted = empty_rows(RIVAL.card)
     if tracked.task is None or tracked.final is None:
         cause = tracked.rows[-1].failure or "no map"
         return [failed_sequence(row, cause) for row in wanted]
-    drive = stereo_drive(RecordingPlan(stereo_scenario(scenario), "localization", out))
+    drive = stereo_drive(RecordingPlan(seen_as_needed(scenario, RIVAL.needs), "localization", out))
     alignment = map_alignment(tracked.final, tracked.task.drive.truth())
     tasks: list[RunTask | str] = [_sequence(row, drive, tracked.task) for row in wanted]
-    runs = iter(pool.run("locate", run_tracker, [task for task in tasks if isinstance(task, RunTask)]))
+    runs = iter(pool.run("locate", run_kept, [task for task in tasks if isinstance(task, RunTask)]))
     found = []
     for row, task in zip(wanted, tasks, strict=True):
         if isinstance(task, RunTask):
@@ -145,7 +138,7 @@ def _sequence(row: SequenceRow, drive: StereoDrive, mapped: RunTask) -> RunTask 
 
 def _prepared(scenario: Scenario, out: Path, seconds: float | None, pool: Workers) -> tuple[StereoDrive, Path]:
     """The pairs of both drives, or those of the first ``seconds`` of the mapping drive alone, and the vocabulary."""
-    stereo = stereo_scenario(scenario)
+    stereo = seen_as_needed(scenario, RIVAL.needs)
     mapping, *others = [RecordingPlan(stereo, role, out) for role in (ROLES if seconds is None else ("mapping",))]
     frames = None if seconds is None else ceil(seconds * stereo.camera.rate_hz)
     if frames is not None and frames < 2:

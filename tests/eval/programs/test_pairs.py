@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.rivals.orbslam3.pairs import (
+from hippodrome.eval.programs.pairs import (
     draw_pairs,
     missing_chunks,
     read_pair,
@@ -50,9 +50,12 @@ def test_a_part_is_fed_with_its_own_frames_and_times(plan):
     if missing_chunks(drive):
         draw_pairs((plan, 0))
     part = drive.part(3, 4)
-    fed = list(part.pairs())
-    assert [float(np.frombuffer(data, "<f8", 1)[0]) for data in fed] == drive.times_s[3:7]
-    assert fed[0] == list(drive.pairs())[3]
+    fed = list(part.observations())
+    assert [one.t_s for one in fed] == drive.times_s[3:7]
+    whole = list(drive.observations())[3]
+    assert (fed[0].frame == whole.frame).all()
+    assert (fed[0].right == whole.right).all()
+    assert (fed[0].right != fed[0].frame).any()
     assert part.duration_s == pytest.approx(0.4)
 
 

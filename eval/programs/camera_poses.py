@@ -1,4 +1,4 @@
-"""From the tracker's camera poses in space to body poses in the plane, and samples as far apart as a map's vertices."""
+"""From the camera poses in space that visual SLAM leaves to body poses in the plane."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COLUMNS = 8  # t x y z qx qy qz qw
 def read_camera_tum(path: Path, forward_m: float) -> Trajectory:
     """Body poses in the plane from a TUM file of camera poses in space.
 
-    For a frame in which it lost tracking, the tracker repeats the line before with its old time stamp: such lines are dropped.
+    For a frame in which they lost tracking, some trackers repeat the line before with its old time stamp: it is dropped.
 
     Args:
         path: The file.
@@ -42,7 +42,7 @@ def read_camera_tum(path: Path, forward_m: float) -> Trajectory:
 def body_poses(positions_m: FloatArray, quaternions: FloatArray, forward_m: float) -> FloatArray:
     """Planar poses (N, 3) of the body.
 
-    The tracker's world is the frame of its first camera: x to the right, y down, z ahead. The plane has x ahead, y to the left.
+    The world is the frame of the first camera: x to the right, y down, z ahead. The plane has x ahead, y to the left.
 
     Args:
         positions_m: Positions (N, 3) of the camera.
@@ -53,11 +53,3 @@ def body_poses(positions_m: FloatArray, quaternions: FloatArray, forward_m: floa
     ahead, right = 1.0 - 2.0 * (x * x + y * y), 2.0 * (x * z + w * y)  # the viewing direction: third column of the rotation
     camera = np.column_stack([positions_m[:, 2], -positions_m[:, 0], np.arctan2(-right, ahead)])
     return se2.compose(camera, np.array([-forward_m, 0.0, 0.0]))
-
-
-def thinned(trajectory: Trajectory, spacing_m: float) -> Trajectory:
-    """One sample per ``spacing_m`` of the way travelled: the first of each such stretch."""
-    steps = np.hypot(*np.diff(trajectory.poses[:, :2], axis=0).T)
-    stretch = np.floor(np.concatenate([[0.0], np.cumsum(steps)]) / spacing_m)
-    kept = np.concatenate([[True], np.diff(stretch) > 0])
-    return Trajectory(trajectory.t_s[kept], trajectory.poses[kept])

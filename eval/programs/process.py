@@ -17,6 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Final
 
+from hippodrome._processes import dying_with_me
 from hippodrome.eval.methods.protocol import MethodError
 from hippodrome.sim.method_spec import MethodSpec
 
@@ -24,6 +25,16 @@ MEGABYTE: Final = 1_000_000
 POLL_S: Final = 0.05  # between two looks at a process: its memory is looked at as well
 FILE_BYTES: Final = 4 << 30  # the longest file that a program may write, its printed text included
 LAST_WORDS: Final = 300  # characters of what a program printed last that an error quotes
+LEAST_WORK: Final = 0.02  # share of a core: a program that uses less of one for longer than its limit has stalled
+# Signals by which a program ends through a fault of its own. Not SIGKILL, by which the system ends it for want of memory.
+OWN_FAULTS: Final = {signal.SIGABRT, signal.SIGSEGV, signal.SIGFPE, signal.SIGBUS, signal.SIGILL}
+CPU_CLOCK: Final = 2  # Linux: the low bits of the number of a process's clock of CPU time, all its threads together
+
+
+class ProgramEnded(MethodError):
+    """A program that did not end well. ``own_fault``: it crashed or stalled, which another run of it need not."""
+
+    own_fault = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +43,12 @@ class Limits:
 
     time_s: float
     memory_bytes: int  # address space of each process, and memory of all of them together
+    stall_s: float | None = None  # how long it may do no work: its threads wait for one another, say; None: for ever
 
     @classmethod
     def of(cls, spec: MethodSpec) -> Limits:
         """Those that a scenario sets for a method."""
-        return cls(spec.time_limit_s, round(spec.memory_limit_mb * MEGABYTE))
+        return cls(spec.time_limit_s, round(spec.memory_limit_mb * MEGABYTE), spec.stall_limit_s)
 
 
 @dataclass(slots=True)
@@ -51,6 +63,8 @@ class Process:
     peak_rss_bytes: int = 0
     status: int | None = None
     stopped: str | None = None  # why it was stopped, if it was
+    stalled: bool = False  # whether it was stopped because it did no work
+    marked: tuple[float, float] | None = None  # when its work was looked at last, and the CPU time that it had taken by then
 
     @property
     def left_s(self) -> float:
@@ -67,9 +81,26 @@ class Process:
                 self.stop(f"hung: no end after {self.limits.time_s:g} s, its limit")
             elif (held := self.look()) > self.limits.memory_bytes:
                 self.stop(f"took {held / 1e6:.0f} MB of memory, more than its limit of {self.limits.memory_bytes / 1e6:.0f} MB")
+            elif self.limits.stall_s is not None and self._stalls(self.limits.stall_s):
+                self.stalled = True
+                self.stop(f"hung: no work for {self.limits.stall_s:g} s")
             return self.status is not None
         self._ended(status, usage)
         return True
+
+    def cpu_now_s(self) -> float:
+        """CPU time that it has taken so far, all its threads; the processes that it started are not counted until they end."""
+        try:
+            return time.clock_gettime((~self.popen.pid << 3) | CPU_CLOCK)
+        except OSError:  # it has just ended
+            return self.cpu_s
+
+    def _stalls(self, limit_s: float) -> bool:
+        """Whether it has done no work for longer than ``limit_s``."""
+        now_s, cpu_s = time.monotonic(), self.cpu_now_s()
+        if self.marked is None or cpu_s - self.marked[1] > LEAST_WORK * limit_s:
+            self.marked = now_s, cpu_s
+        return now_s - self.marked[0] > limit_s
 
     def look(self) -> int:
         """Memory [bytes] that it and the processes of its group hold together now; the most that one of them held is remembered.
@@ -97,11 +128,17 @@ class Process:
             self._ended(status, usage)
 
     def wait(self) -> None:
-        """Until it ends by itself or is past a limit. Raises MethodError unless it ended well."""
+        """Until it ends by itself or is past a limit. Raises ProgramEnded unless it ended well."""
         while not self.poll():
             time.sleep(POLL_S)
         if (cause := self.failure()) is not None:
-            raise MethodError(cause)
+            raise self.error(cause)
+
+    def error(self, cause: str) -> ProgramEnded:
+        """What is raised of a program that did not end well."""
+        error = ProgramEnded(cause)
+        error.own_fault = self.stalled or (self.stopped is None and self.status is not None and -self.status in OWN_FAULTS)
+        return error
 
     def failure(self) -> str | None:
         """Why it did not end well; None if it did, or still runs."""
@@ -146,8 +183,9 @@ def started(
         words = _concealing(concealed) + [str(word) for word in command]
         try:
             popen = subprocess.Popen(
-                words, stdin=pipe, stdout=subprocess.PIPE if fed else stream, stderr=stream, start_new_session=True
-            )
+                words, stdin=pipe, stdout=subprocess.PIPE if fed else stream, stderr=stream, start_new_session=True,
+                preexec_fn=dying_with_me(),
+            )  # fmt: skip
         except OSError as error:
             cure = "does it begin with #! and its interpreter?"
             raise MethodError(f"'{command[0]}' cannot be started: {error.strerror}; {cure}") from None

@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Final
 
 from hippodrome.core.types import HippodromeError, Observation, Trajectory
-from hippodrome.eval.contest.layouts import write_sequence
-from hippodrome.eval.contest.process import Limits, Process, command_words, last_words, started
 from hippodrome.eval.files.trajectories import read_tum
 from hippodrome.eval.methods.protocol import Answer, Cost, Given, Localized, Mapped, MethodError
+from hippodrome.eval.programs.camera_poses import read_camera_tum
+from hippodrome.eval.programs.environments import words_of
+from hippodrome.eval.programs.layouts import write_sequence
+from hippodrome.eval.programs.process import Limits, Process, last_words, started
 from hippodrome.sim.method_spec import MethodSpec
 
 TRAJECTORY: Final = "trajectory.tum"  # that a program leaves in its folder {out}
@@ -29,8 +31,12 @@ class ProgramMapper:
         """Its trajectory of the mapping drive. Raises MethodError with the cause if there is none."""
         sequence, out = given.folder / "sequence", given.folder / "out"
         write_sequence(observations, given, self._spec.input, sequence)
-        process = run_program(self._spec, command_words(self._command, sequence=sequence, out=out), out, given)
-        return Mapped(read_answer(out, process), state=out, cost=Cost(process.cpu_s, process.peak_rss_bytes))
+        process = run_program(self._spec, words_of(self._spec, self._command, sequence=sequence, out=out), out, given)
+        return Mapped(self._answer(out, process, given), state=out, cost=Cost(process.cpu_s, process.peak_rss_bytes))
+
+    def _answer(self, out: Path, process: Process, given: Given) -> Trajectory:
+        """The trajectory that it left, as poses of the rear axle."""
+        return read_answer(out, process, given.camera.forward_m if self._spec.axes == "camera" else None)
 
 
 class ProgramLocalizer(ProgramMapper):
@@ -42,10 +48,10 @@ class ProgramLocalizer(ProgramMapper):
         assert given.mapped is not None
         sequence, out = given.folder / "second-sequence", given.folder / "second-out"
         times_s = write_sequence(observations, given, self._spec.input, sequence)
-        words = command_words(self._spec.localize, sequence=sequence, out=out, map=given.mapped.state)
+        words = words_of(self._spec, self._spec.localize, sequence=sequence, out=out, map=given.mapped.state)
         process = run_program(self._spec, words, out, given)
         cost = Cost(process.cpu_s, process.peak_rss_bytes)
-        return Localized(answers_at(times_s, read_answer(out, process)), cost)
+        return Localized(answers_at(times_s, self._answer(out, process, given)), cost)
 
 
 def run_program(spec: MethodSpec, words: list[str], out: Path, given: Given) -> Process:
@@ -56,8 +62,14 @@ def run_program(spec: MethodSpec, words: list[str], out: Path, given: Given) -> 
     return process
 
 
-def read_answer(out: Path, process: Process) -> Trajectory:
-    """The trajectory that a program left. Raises MethodError that names the file as the program knows it."""
+def read_answer(out: Path, process: Process, camera_ahead_m: float | None = None) -> Trajectory:
+    """The trajectory that a program left. Raises MethodError that names the file as the program knows it.
+
+    Args:
+        out: Its folder.
+        process: Its process, which has ended.
+        camera_ahead_m: How far ahead of the rear axle the camera sits whose poses it left; None: it left the axle's.
+    """
     path = out / TRAJECTORY
     if not path.is_file():
         left = ", ".join(sorted(entry.name for entry in out.iterdir())[:5]) or "nothing"
@@ -65,7 +77,7 @@ def read_answer(out: Path, process: Process) -> Trajectory:
             f"it ended with status 0 and left no {TRAJECTORY} in {{out}}, but {left}; its last words: {last_words(process.log)}"
         )
     try:
-        return read_tum(path)
+        return read_tum(path) if camera_ahead_m is None else read_camera_tum(path, camera_ahead_m)
     except HippodromeError as error:
         raise MethodError(str(error).replace(f"{out}/", "")) from None
 

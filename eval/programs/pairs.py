@@ -1,7 +1,7 @@
 """Stereo pairs of a drive on disk: grey JPEG images in resumable chunks, a quarter of what colour PNG would take.
 
-A drive of 20 minutes has 15,000 pairs, 10 GB as PNG. The tracker uses grey images only, and cameras that record for SLAM compress
-their images as well.
+They are for methods that need another camera than the scenario's. A drive of 20 minutes has 15,000 pairs of 640x480, 10 GB as
+PNG. Trackers use grey images only, and cameras that record for SLAM compress their images as well.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from hippodrome._files import replacing
 from hippodrome.core.types import Frame, HippodromeError, Trajectory
+from hippodrome.eval.methods.protocol import StereoObservation
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.record import RecordingPlan, draw_chunk
 from hippodrome.sim.recording import CHUNK_FRAMES, read_samples
@@ -54,11 +55,13 @@ class StereoDrive:
         """The stretch of ``frames`` pairs from the pair ``first`` of this one on."""
         return StereoDrive(self.folder, self.samples, self.camera, self.first + first, frames)
 
-    def pairs(self) -> Iterator[bytes]:
-        """Time stamp, left and right grey image of each frame, as bytes in the form that ``runner.py`` reads."""
-        for number, t_s in enumerate(self.times_s, start=self.first):
-            left, right = read_pair(self.folder, number)
-            yield np.float64(t_s).astype("<f8").tobytes() + left.tobytes() + right.tobytes()
+    def observations(self) -> Iterator[StereoObservation]:
+        """The steps that have a pair, with grey images (H, W)."""
+        samples = self.samples
+        for number in range(self.first, self.first + self.frames):
+            step = int(samples.frame_steps[number])
+            one, (left, right) = samples.observation(step, None), read_pair(self.folder, number)
+            yield StereoObservation(one.t_s, one.dt_s, one.speed, one.yaw_rate_radps, left, right)
 
 
 def stereo_drive(plan: RecordingPlan, frames: int | None = None) -> StereoDrive:

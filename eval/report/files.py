@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -37,6 +38,8 @@ CAPTIONS: Final = {
     "frames": "The mapping drive as the camera sees it",
 }
 
+PHOTOS: Final = ("frames", "neurodynamics")  # figures made of camera frames
+
 
 @dataclass(frozen=True, slots=True)
 class Picture:
@@ -46,6 +49,8 @@ class Picture:
     uri: str
     width: int
     height: int
+    svg: str | None = None  # the same as SVG, packed with gzip and base64; None where none was drawn
+    photo: bool = False  # whether it shows camera frames, whose colours are left alone in the dark
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +112,19 @@ def _picture(path: Path) -> Picture | None:
     if len(coded) > LOSSLESS_BYTES:
         _, coded = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, PHOTO_QUALITY])
     height, width = image.shape[:2]
-    return Picture(_caption(path.stem), data_uri("image/webp", coded.tobytes()), width, height)
+    return Picture(
+        _caption(path.stem),
+        data_uri("image/webp", coded.tobytes()),
+        width,
+        height,
+        _packed(path.with_suffix(".svg")),
+        path.stem in PHOTOS,
+    )
+
+
+def _packed(path: Path) -> str | None:
+    """A figure's SVG as the page unpacks it; None if there is none. The same file gives the same bytes."""
+    return base64.b64encode(gzip.compress(path.read_bytes(), mtime=0)).decode() if path.exists() else None
 
 
 def _kind(stem: str) -> str | None:

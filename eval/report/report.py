@@ -21,8 +21,12 @@ COMPARE: Final = "compare"  # id of the panel with all scenarios
 # While the page is still being read only its first panel is shown; should a script fail, all of them are.
 EARLY: Final = 'document.documentElement.className="js";addEventListener("error",()=>{document.documentElement.className=""})'
 SCRIPTS: Final = (
-    "map.js",
+    "basics.js",
+    "vector.js",
+    "save.js",
     "story.js",
+    "mapview.js",
+    "map.js",
     "scene.js",
     "chart.js",
     "brain.js",

@@ -174,7 +174,9 @@ def _gallery(pictures: Sequence[Picture]) -> Html:
 def _figure(picture: Picture) -> Html:
     image = element("img", src=picture.uri, alt=picture.caption, width=picture.width, height=picture.height)
     button = element("button", image, type="button", class_="enlarge", aria_label=f"Enlarge: {picture.caption}")
-    return element("figure", button, element("figcaption", picture.caption), class_="wide" if picture.width > 1400 else None)
+    kinds = " ".join(kind for kind, has in (("wide", picture.width > 1400), ("photo", picture.photo)) if has) or None
+    drawn = Html(f'<script type="text/plain">{picture.svg}</script>') if picture.svg else None
+    return element("figure", button, drawn, element("figcaption", picture.caption), class_=kinds)
 
 
 def _timings(scenario: ScenarioResult) -> Html | None:

@@ -15,7 +15,7 @@ const paper = { on: false };
 
 /** Large errors stand out: dark on white, bright on black. */
 function ramp() {
-  return dark.matches && !paper.on ? VIRIDIS : [...VIRIDIS].reverse();
+  return dark.matches && !paper.on ? VIRIDIS.slice(2) : [...VIRIDIS].reverse(); // the darkest two are not seen on black
 }
 
 function errorColour(error) {

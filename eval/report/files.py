@@ -79,7 +79,7 @@ def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
     figures = sorted(folder.glob("*.png"), key=lambda path: (_order(path.stem), path.stem))
     frames, second, second_frames = (folder / name for name in (THUMBNAILS, BELIEF_JSON, SECOND_FRAMES))
     return ScenarioFiles(
-        tuple(picture for path in figures if (picture := _picture(path)) is not None),
+        tuple(picture for path in figures if (picture := read_picture(path)) is not None),
         read_map_evidence(folder / MAP_JSON) if (folder / MAP_JSON).exists() else None,
         data_uri("image/jpeg", frames.read_bytes()) if frames.exists() else None,
         tuple(_parsed(folder / TABLE_TWO, list[SequenceRow]) or ()),
@@ -103,7 +103,7 @@ def data_uri(media_type: str, content: bytes) -> str:
     return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
 
 
-def _picture(path: Path) -> Picture | None:
+def read_picture(path: Path) -> Picture | None:
     """The figure as WebP, which takes a third of the PNG's size; without loss unless that is large. None if it is no picture."""
     image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
     if image is None:

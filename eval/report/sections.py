@@ -62,7 +62,7 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         _titled("Why is it wrong here? The worst places", mapping_places(files, scenario.name)),
         localization_places(files, scenario.name),
         _titled("Breaks", break_table(scenario)),
-        _titled("Figures", _gallery(files.pictures) if files.pictures else None),
+        _titled("Figures", gallery(files.pictures) if files.pictures else None),
         _titled("Stage times", _timings(scenario)),
         element("h3", "Run it again"),
         _commands(scenario, files.evidence),
@@ -167,7 +167,8 @@ def _interactive_map(files: ScenarioFiles) -> Html:
                    class_="map")  # fmt: skip
 
 
-def _gallery(pictures: Sequence[Picture]) -> Html:
+def gallery(pictures: Sequence[Picture]) -> Html:
+    """Figures that open by a click and are saved by buttons."""
     return element("div", [_figure(picture) for picture in pictures], class_="gallery")
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from hippodrome._files import write_atomically
 from hippodrome.eval.board.entries import Cell, Drive, Table, read_folders, tables
 from hippodrome.eval.report.markup import Html, element, joined
-from hippodrome.eval.report.report import POLICY
+from hippodrome.eval.report.pages import POLICY
 from hippodrome.eval.report.tables import scrolling
 
 BOARD: Final = "board.html"

@@ -72,11 +72,17 @@ def add_gate_commands(commands: Any) -> None:
         commands, "compare", _compare, "show two results side by side",
         """Print which figures of the results in B differ from those in A, and by how much. It is no test and gives no verdict.
 
-        Both are folders that `hippodrome eval` wrote. Results of different scenarios, drives or definitions are refused.""",
-        ["hippodrome compare out/before out/after"],
+        Both are folders that `hippodrome eval` wrote. Results of different scenarios, drives or definitions are refused. With
+        --html a page is written that shows the maps of both side by side, and where on them the errors changed.""",
+        ["hippodrome compare out/before out/after",
+         "hippodrome compare out/before out/after --html"],
     )  # fmt: skip
     pair.add_argument("before", type=Path, metavar="A", help="folder with the first results.json")
     pair.add_argument("after", type=Path, metavar="B", help="folder with the second results.json")
+    pair.add_argument(
+        "--html", type=Path, nargs="?", const=Path(), metavar="FILE",
+        help="also write a page with the maps of both; without FILE it is B/compare.html (default: no page)",
+    )  # fmt: skip
 
 
 def _seeds(text: str) -> tuple[int, ...]:
@@ -122,7 +128,9 @@ def _gate(options: argparse.Namespace) -> int:
 
 def _compare(options: argparse.Namespace) -> int:
     from hippodrome.eval.gate.two_runs import compare_folders
+    from hippodrome.eval.report.versus import COMPARE_PAGE
     from hippodrome.eval.results.terminal import PlainConsole
 
-    compare_folders(options.before, options.after, PlainConsole())
+    page = options.after / COMPARE_PAGE if options.html == Path() else options.html
+    compare_folders(options.before, options.after, PlainConsole(), page)
     return DONE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -59,8 +60,10 @@ def add_run_commands(commands: Any) -> None:
 
         The report is one page that needs no network: tables, figures, an interactive map, and the worst places with their
         frames.""",
-        ["hippodrome report out/eval"],
+        ["hippodrome report out/eval",
+         "hippodrome report out/eval --open"],
     )  # fmt: skip
+    report.add_argument("--open", action="store_true", help="show the page in the browser, too (default: say where it is)")
     report.add_argument(
         "results", type=Path, metavar="DIR", help="the folder that `hippodrome eval` wrote, with results.json in it"
     )
@@ -83,5 +86,16 @@ def _render(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     from hippodrome.eval.report.report import write_report
 
-    print(write_report(options.results))
+    page = write_report(options.results)
+    print(page)
+    if options.open:
+        show(page)
     return DONE
+
+
+def show(page: Path) -> None:
+    """Show a page in the user's browser; where there is none, say so on standard error."""
+    import webbrowser
+
+    if not webbrowser.open(page.resolve().as_uri()):
+        print(f"{page}: no browser to show it in was found; open the file in one", file=sys.stderr)

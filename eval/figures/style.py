@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -37,11 +38,28 @@ def new_figure(width_in: float, height_in: float) -> Any:
     return figure
 
 
-def save_figure(figure: Any, path: Path) -> None:
-    """Write a figure as PNG, atomically, without date or program version in it."""
+def save_figure(figure: Any, path: Path, *, with_svg: bool = False) -> None:
+    """Write a figure as PNG, atomically, without date or program version in it.
+
+    Args:
+        figure: The figure.
+        path: The PNG.
+        with_svg: Whether to write it as SVG too, beside the PNG, for print: letters stay letters, and nothing is pixels.
+    """
     buffer = BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
     write_atomically(path, buffer.getvalue())
+    if with_svg:
+        write_atomically(path.with_suffix(".svg"), _as_svg(figure))
+
+
+def _as_svg(figure: Any) -> bytes:
+    """The figure as SVG; the same figure gives the same bytes."""
+    figure.set_layout_engine("none")  # the PNG has laid it out already
+    buffer = BytesIO()
+    with rc_context({"svg.hashsalt": "hippodrome", "svg.fonttype": "none"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return buffer.getvalue()
 
 
 def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:

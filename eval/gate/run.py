@@ -15,6 +15,7 @@ from hippodrome.eval.gate.baseline import Baseline, GateError, baseline_of, read
 from hippodrome.eval.gate.compare import Verdict, compare
 from hippodrome.eval.gate.report import junit_xml, outcome_of, print_verdict, summary_markdown
 from hippodrome.eval.gate.statistics import MIN_PAIRS
+from hippodrome.eval.report.pages import write_trial_page
 from hippodrome.eval.results.model import Results
 from hippodrome.eval.results.terminal import PlainConsole
 from hippodrome.eval.results.thresholds import failed_limits
@@ -22,6 +23,8 @@ from hippodrome.eval.run import load_scenarios, run_scenarios
 from hippodrome.sim.scenario import Thresholds
 
 SUMMARY = "GITHUB_STEP_SUMMARY"  # where GitHub Actions wants Markdown
+
+PAGE = "gate.html"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +60,12 @@ def gate(request: GateRequest) -> str:
     runs = [_run(request, seed) for seed in request.seeds]
     found, limits = baseline_of(runs), broken_limits(runs)
     if known is not None:
-        return say(compare(found, known, request.town_limit), limits, request.junit)
+        verdict = compare(found, known, request.town_limit)
+        outcome = say(verdict, limits, request.junit)
+        text = summary_markdown(verdict, limits)
+        write_trial_page(request.out / PAGE, "Gate", text, command="hippodrome gate", verdict=outcome)
+        print(f"page: {request.out / PAGE}")
+        return outcome
     _show_update(found, request.baseline, limits)
     write_baseline(request.baseline, found)
     print(f"{request.baseline}: written, {len(found.cells)} cells; commit it")

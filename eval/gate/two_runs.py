@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from rich.console import Console
 from rich.table import Table
 
 from hippodrome.eval.gate.baseline import baseline_of
 from hippodrome.eval.gate.compare import MOVED, lost_cells, require_comparable
+from hippodrome.eval.report.markup import Child, element
+from hippodrome.eval.report.versus import write_versus
 from hippodrome.eval.results.model import Results, read_results
+
+HEADS: Final = ("scenario", "seed", "method", "figure", "before", "after", "change")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,25 +52,43 @@ def differences(before: Results, after: Results) -> list[Difference]:
     ]
 
 
-def compare_folders(before: Path, after: Path, console: Console) -> None:
-    """Print what moved between two result folders, and what was lost or found outright."""
+def compare_folders(before: Path, after: Path, console: Console, page: Path | None = None) -> None:
+    """Print what moved between two result folders, and what was lost or found outright; ``page`` is written, too, if given.
+
+    Raises HippodromeError if they do not compare, or if a file cannot be read.
+    """
     old, new = (read_results(folder / "results.json") for folder in (before, after))
     found = differences(old, new)
     moved = [one for one in found if abs(one.share) > MOVED]
     if moved:
         console.print(_table(moved))
     then, now = ({cell.key: cell for cell in baseline_of([one]).cells} for one in (old, new))
-    for line in (*lost_cells(now, then), *(f"{line}, in {before}" for line in lost_cells(then, now))):
+    lost = [*lost_cells(now, then), *(f"{line}, in {before}" for line in lost_cells(then, now))]
+    for line in lost:
         console.print(line, markup=False, highlight=False)
     console.print(f"{len(moved)} figure(s) moved, {len(found) - len(moved)} stand still", markup=False, highlight=False)
+    if page is not None:
+        names = [one.name for one in new.scenarios]
+        write_versus(page, (before, after), names, HEADS, [_toned(one) for one in moved], lost)
+        console.print(f"page: {page}", soft_wrap=True)
 
 
 def _table(moved: list[Difference]) -> Table:
     table = Table()
-    for head in ("scenario", "seed", "method", "figure", "before", "after", "change"):
+    for head in HEADS:
         table.add_column(head, justify="right" if head in ("seed", "before", "after", "change") else "left")
     for one in moved:
-        cells = (one.scenario, str(one.seed), one.method, one.figure, f"{one.before:.3g}", f"{one.after:.3g}",
-                 f"{100.0 * one.share:+.1f} %")  # fmt: skip
-        table.add_row(*cells, style="green" if one.share < 0.0 else "red")
+        table.add_row(*_cells(one), style="green" if one.share < 0.0 else "red")
     return table
+
+
+def _cells(one: Difference) -> list[str]:
+    """The cells below ``HEADS``."""
+    figures = (f"{one.before:.3g}", f"{one.after:.3g}", f"{100.0 * one.share:+.1f} %")
+    return [one.scenario, str(one.seed), one.method, one.figure, *figures]
+
+
+def _toned(one: Difference) -> list[Child]:
+    """The same, the change in the colour of better or worse."""
+    *cells, change = _cells(one)
+    return [*cells, element("span", change, class_="good" if one.share < 0.0 else "bad")]

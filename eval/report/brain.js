@@ -19,11 +19,16 @@ function makeBrain(root) {
   const ring = root.querySelector(".ring"), sheets = [...root.querySelectorAll(".sheet")];
   const images = sheets.map((sheet) => { sheet.width = sheet.height = CELLS; return sheet.getContext("2d").createImageData(CELLS, CELLS); });
 
-  function drawRing(belief, i) {
-    const ratio = window.devicePixelRatio || 1, side = ring.clientWidth, pen = ring.getContext("2d"), middle = side / 2;
+  function showRing(belief, i) {
+    const ratio = window.devicePixelRatio || 1, side = ring.clientWidth, pen = ring.getContext("2d");
     if (!side) return;
     ring.width = ring.height = Math.round(side * ratio);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    drawRing(pen, side, belief, i);
+  }
+
+  function drawRing(pen, side, belief, i) {
+    const middle = side / 2;
     for (let population = 0; population < 2; population++) {
       const mean = belief.head_rad[i][population], reliability = belief.head_reliability[i][population];
       const inner = middle * (population ? 0.52 : 0.76), thick = middle * 0.22;
@@ -58,10 +63,31 @@ function makeBrain(root) {
     sheets[module].getContext("2d").putImageData(images[module], 0, 0);
   }
 
-  return (belief, i) => {
-    drawRing(belief, i);
-    const modules = Math.min(sheets.length, belief.grid_rad[i].length / 4);
-    sheets.forEach((sheet, module) => { sheet.closest("figure").hidden = module >= modules; });
-    for (let module = 0; module < modules; module++) drawSheet(module, belief, i);
+  const modulesOf = (belief, i) => Math.min(sheets.length, belief.grid_rad[i].length / 4);
+
+  return {
+    draw(belief, i) {
+      showRing(belief, i);
+      const modules = modulesOf(belief, i);
+      sheets.forEach((sheet, module) => { sheet.closest("figure").hidden = module >= modules; });
+      for (let module = 0; module < modules; module++) drawSheet(module, belief, i);
+    },
+    /** Ring and sheets in a row as SVG. */
+    vector(belief, i) {
+      const side = 150, gap = 12, modules = modulesOf(belief, i), size = { clientWidth: (modules + 1) * (side + gap) + gap, clientHeight: side + 40 };
+      for (let module = 0; module < modules; module++) drawSheet(module, belief, i);
+      return onPaper(ring, size, (svg) => {
+        ["heading", ...sheets.slice(0, modules).map((_, module) => `grid module ${module + 1}`)].forEach((words, place) => {
+          const x = gap + place * (side + gap);
+          svg.fillStyle = "#333333";
+          svg.fillText(words, x, side + 30);
+          if (place) return svg.drawImage(sheets[place - 1], x, gap, side, side);
+          svg.save();
+          svg.translate(x, gap);
+          drawRing(svg, side, belief, i);
+          svg.restore();
+        });
+      });
+    },
   };
 }

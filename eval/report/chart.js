@@ -19,10 +19,10 @@ function makeChart(canvas, story) {
   }
 
   function resize() {
-    const w = canvas.clientWidth, h = canvas.clientHeight, ratio = window.devicePixelRatio || 1, style = getComputedStyle(canvas);
+    const w = canvas.clientWidth, h = canvas.clientHeight, ratio = window.devicePixelRatio || 1;
     if (!w || !h) return (size = null);
     size = { w, h, ratio };
-    inks = Object.fromEntries(["line", "soft", "ink", "panel", "accent", "bad"].map((key) => [key, style.getPropertyValue(`--${key}`).trim()]));
+    inks = inksOf(canvas, ["line", "soft", "ink", "panel", "accent", "bad"]);
     for (const one of [canvas, still]) { one.width = Math.round(w * ratio); one.height = Math.round(h * ratio); }
     drawStill(still.getContext("2d"));
     return size;
@@ -104,6 +104,10 @@ function makeChart(canvas, story) {
   return {
     tell,
     forget() { size = null; },
+    /** The curves as SVG; the screen is drawn anew afterwards. */
+    vector() {
+      return onPaper(canvas, canvas, (svg) => { resize(); drawStill(svg); size = null; });
+    },
     draw(s) {
       if (!size && !resize()) return;
       pen.setTransform(1, 0, 0, 1, 0, 0);

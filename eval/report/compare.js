@@ -20,6 +20,7 @@ function startCards(root) {
     if (root.offsetParent) for (const { scene, segments, name, words } of cards) {
       const moment = momentAt(segments, share * segments.at(-1).s1);
       scene.draw(moment, name);
+      performance.mark("first picture");
       words.textContent = { map: "mapping", roads: "the map comes right", find: "where am I?", follow: "localized" }[moment.kind];
     }
     if (playing) redraw();

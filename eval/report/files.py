@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -37,6 +38,8 @@ CAPTIONS: Final = {
     "frames": "The mapping drive as the camera sees it",
 }
 
+PHOTOS: Final = ("frames", "neurodynamics")  # figures made of camera frames
+
 
 @dataclass(frozen=True, slots=True)
 class Picture:
@@ -46,6 +49,8 @@ class Picture:
     uri: str
     width: int
     height: int
+    svg: str | None = None  # the same as SVG, packed with gzip and base64; None where none was drawn
+    photo: bool = False  # whether it shows camera frames, whose colours are left alone in the dark
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +79,7 @@ def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
     figures = sorted(folder.glob("*.png"), key=lambda path: (_order(path.stem), path.stem))
     frames, second, second_frames = (folder / name for name in (THUMBNAILS, BELIEF_JSON, SECOND_FRAMES))
     return ScenarioFiles(
-        tuple(picture for path in figures if (picture := _picture(path)) is not None),
+        tuple(picture for path in figures if (picture := read_picture(path)) is not None),
         read_map_evidence(folder / MAP_JSON) if (folder / MAP_JSON).exists() else None,
         data_uri("image/jpeg", frames.read_bytes()) if frames.exists() else None,
         tuple(_parsed(folder / TABLE_TWO, list[SequenceRow]) or ()),
@@ -98,7 +103,7 @@ def data_uri(media_type: str, content: bytes) -> str:
     return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
 
 
-def _picture(path: Path) -> Picture | None:
+def read_picture(path: Path) -> Picture | None:
     """The figure as WebP, which takes a third of the PNG's size; without loss unless that is large. None if it is no picture."""
     image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
     if image is None:
@@ -107,7 +112,19 @@ def _picture(path: Path) -> Picture | None:
     if len(coded) > LOSSLESS_BYTES:
         _, coded = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, PHOTO_QUALITY])
     height, width = image.shape[:2]
-    return Picture(_caption(path.stem), data_uri("image/webp", coded.tobytes()), width, height)
+    return Picture(
+        _caption(path.stem),
+        data_uri("image/webp", coded.tobytes()),
+        width,
+        height,
+        _packed(path.with_suffix(".svg")),
+        path.stem in PHOTOS,
+    )
+
+
+def _packed(path: Path) -> str | None:
+    """A figure's SVG as the page unpacks it; None if there is none. The same file gives the same bytes."""
+    return base64.b64encode(gzip.compress(path.read_bytes(), mtime=0)).decode() if path.exists() else None
 
 
 def _kind(stem: str) -> str | None:

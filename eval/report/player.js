@@ -73,6 +73,7 @@ function startPlayer(root) {
     if (!segments.length || !root.offsetParent) return;
     const moment = momentAt(segments, s);
     scene.draw(moment, name);
+    performance.mark("first picture");
     chart.draw(s);
     const drive = secondDrive(story, name), second = partOf(moment.kind) === "find";
     if (traces && drive && drive.grid_rad && drive.grid_rad[0].length) traces.draw(drive, second ? moment.t : drive.t_s[0]);
@@ -108,7 +109,7 @@ function startPlayer(root) {
     const view = find(".fired"), view_s = drive.view_s ? drive.view_s[i] : null;
     view.hidden = view_s === null || !films[0];
     if (!view.hidden) caption(".fired", films[0](view.querySelector("canvas"), view_s), `view of ${view_s.toFixed(0)} s fired; frame of`);
-    if (brain && drive.grid_rad && drive.grid_rad[i].length) brain(drive, i);
+    if (brain && drive.grid_rad && drive.grid_rad[i].length) brain.draw(drive, i);
   }
 
   function caption(figure, t, words) {
@@ -136,7 +137,18 @@ function startPlayer(root) {
     redraw();
   }
 
+  /** What of this town can be saved as a picture: the moment on the map, the curves, the networks. */
+  function pictures() {
+    const town = section.dataset.town, then = (svg) => { redraw(); return svg; };
+    const here = () => momentAt(segments, s), drive = () => secondDrive(story, name);
+    const found = [[`${town}, the moment`, () => then(scene.vector(here(), name, [`${town}: ${tell(here())[0]}`, tell(here()).slice(1).join("; ")]))], [`${town}, the errors`, () => then(chart.vector())]];
+    if (brain) found.push([`${town}, the networks`, () => brain.vector(drive(), before(drive().t_s, ["map", "roads"].includes(here().kind) ? Infinity : here().t))]);
+    return found;
+  }
+
   function setUp() {
+    find(".transport").append(saveBox(pictures()));
+    if (traces) strip.parentElement.after(saveBox([[`${section.dataset.town}, certainty of the networks`, () => { const svg = traces.vector(secondDrive(story, name)); redraw(); return svg; }]]));
     const select = find(".choice");
     for (const choice of story.choices) select.append(make("option", choice, { value: choice, selected: choice === name }));
     if (story.semi) find(".mark.own").style.background = story.colours[story.semi.name];

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
 from hippodrome._files import write_atomically
 from hippodrome.eval.report.files import ScenarioFiles, read_scenario_files
 from hippodrome.eval.report.markup import Html, element, joined
+from hippodrome.eval.report.pages import page
 from hippodrome.eval.report.player import towns
 from hippodrome.eval.report.sections import scenario_section
 from hippodrome.eval.report.tables import anchor, overview
@@ -21,8 +21,12 @@ COMPARE: Final = "compare"  # id of the panel with all scenarios
 # While the page is still being read only its first panel is shown; should a script fail, all of them are.
 EARLY: Final = 'document.documentElement.className="js";addEventListener("error",()=>{document.documentElement.className=""})'
 SCRIPTS: Final = (
-    "map.js",
+    "basics.js",
+    "vector.js",
+    "save.js",
     "story.js",
+    "mapview.js",
+    "map.js",
     "scene.js",
     "chart.js",
     "brain.js",
@@ -32,8 +36,6 @@ SCRIPTS: Final = (
     "tables.js",
     "tabs.js",
 )  # each uses those before it
-# The page asks no server for anything: pictures, style and script are in the file itself.
-POLICY: Final = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
 
 def write_report(out: Path) -> Path:
@@ -54,16 +56,13 @@ def report_html(results: Results, out: Path) -> str:
     sections = [scenario_section(place, one, quoted, found[place]) for place, one in enumerate(results.scenarios)]
     links = [element("a", "Compare", href=f"#{COMPARE}")]
     links += [element("a", one.name, href=f"#{anchor(place)}") for place, one in enumerate(results.scenarios)]
-    body = element(
-        "body",
+    body = [
         element("header", element("h1", "Topometric maps, scored"), element("nav", links, class_="tabs", aria_label="Towns")),
         element("main", _all_scenarios(results, found), sections),
         element("footer", "Made by ", element("code", "hippodrome eval"), "; ", element("code", "hippodrome report DIR"),
                 " makes it again from results.json and the files beside it."),
-        element("dialog", element("button", element("img", alt=""), type="button", aria_label="Close")),
-        element("script", Html("\n".join(_asset(name) for name in SCRIPTS))),
-    )  # fmt: skip
-    return "<!doctype html>\n" + element("html", _head(), body, lang="en") + "\n"
+    ]  # fmt: skip
+    return page("hippodrome report", body, SCRIPTS, EARLY)
 
 
 def _all_scenarios(results: Results, found: Sequence[ScenarioFiles]) -> Html:
@@ -79,19 +78,6 @@ def _all_scenarios(results: Results, found: Sequence[ScenarioFiles]) -> Html:
     )
 
 
-def _head() -> Html:
-    return element(
-        "head",
-        element("meta", charset="utf-8"),
-        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("meta", http_equiv="Content-Security-Policy", content=POLICY),
-        element("meta", name="color-scheme", content="light dark"),
-        element("title", "hippodrome report"),
-        element("script", Html(EARLY)),
-        element("style", Html(_asset("style.css"))),
-    )
-
-
 def _lede(results: Results) -> Html:
     """What was done, in one sentence."""
     count = len(results.scenarios)
@@ -100,7 +86,3 @@ def _lede(results: Results) -> Html:
     towns = "1 town" if count == 1 else f"{count} towns"
     return joined(f"{towns} with {km:.1f} km of road, mapped from {frames:,} camera frames over {drive_s / 60:.0f} minutes of "
                   "driving; each map refined with the road network, and a second drive localized in it.")  # fmt: skip
-
-
-def _asset(name: str) -> str:
-    return (files("hippodrome.eval.report") / name).read_text(encoding="utf-8")

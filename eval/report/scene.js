@@ -4,13 +4,21 @@ const HEAD_PX = 62, FOOT_PX = 24; // above and below a large map, for its words 
 const ANYWHERE_M = 150; // half axis of a belief that covers a town: drawn as a veil over all of it
 
 function storyBounds(story) {
-  const paths = [story.data.truth, story.semi, ...story.refined].filter((path) => path && path.t_s.length);
+  const second = story.second ? [story.second.truth, ...story.second.beliefs.filter((one) => story.choices.includes(one.name)).map(localizedPart)] : [];
+  const paths = [story.data.truth, story.semi, ...story.refined, ...second].filter((path) => path && path.t_s.length);
   const all = (key, pick) => paths.reduce((worst, path) => path[key].reduce((a, b) => pick(a, b), worst), pick === Math.min ? Infinity : -Infinity);
   return paths.length ? [all("x_m", Math.min), all("y_m", Math.min), all("x_m", Math.max), all("y_m", Math.max)] : [0, 0, 1, 1];
 }
 
+/** What a localizer said from its first fix on: before, its guesses may lie anywhere. */
+function localizedPart(drive) {
+  const kept = drive.t_s.flatMap((_, i) => (drive.localized[i] ? [i] : []));
+  return { t_s: kept, x_m: kept.map((i) => drive.x_m[i]), y_m: kept.map((i) => drive.y_m[i]) };
+}
+
 function makeScene(canvas, story) {
-  const pen = canvas.getContext("2d"), still = document.createElement("canvas"), bounds = storyBounds(story);
+  let pen = canvas.getContext("2d");
+  const still = document.createElement("canvas"), bounds = storyBounds(story);
   let view = null, inks = null;
   const X = (x) => view.x + view.scale * x, Y = (y) => view.y - view.scale * y;
 
@@ -20,8 +28,7 @@ function makeScene(canvas, story) {
     const [x0, y0, x1, y1] = bounds, [head, foot] = canvas.matches(".scene") ? [HEAD_PX, FOOT_PX] : [0, 0], room = h - head - foot;
     const scale = 0.9 * Math.min(w / Math.max(x1 - x0, 1), room / Math.max(y1 - y0, 1));
     view = { w, h, ratio, scale, x: w / 2 - scale * (x0 + x1) / 2, y: head + room / 2 + scale * (y0 + y1) / 2 };
-    const style = getComputedStyle(canvas);
-    inks = Object.fromEntries(["road", "truth", "soft", "accent", "bad", "good", "paper", "ink"].map((key) => [key, style.getPropertyValue(`--${key}`).trim()]));
+    inks = inksOf(canvas, ["road", "truth", "soft", "accent", "bad", "good", "paper", "ink"]);
     for (const one of [canvas, still]) { one.width = Math.round(w * ratio); one.height = Math.round(h * ratio); }
     drawStill(still.getContext("2d"));
     return view;
@@ -178,6 +185,14 @@ function makeScene(canvas, story) {
     pen.restore();
   }
 
+  function drawMoment(moment, name) {
+    pen.lineJoin = "round";
+    const layer = story.refined.find((one) => one.name === name);
+    if (moment.kind === "map") drawMapping(moment.t);
+    else if (moment.kind === "roads") drawRoads(moment.t, layer);
+    else drawSecond(moment.t, layer, secondDrive(story, name));
+  }
+
   /** Draw the moment of a story told with one of its refined maps. */
   return {
     resize,
@@ -187,12 +202,21 @@ function makeScene(canvas, story) {
       pen.clearRect(0, 0, canvas.width, canvas.height);
       pen.drawImage(still, 0, 0);
       pen.setTransform(view.ratio, 0, 0, view.ratio, 0, 0);
-      pen.lineJoin = "round";
-      const layer = story.refined.find((one) => one.name === name);
-      if (moment.kind === "map") drawMapping(moment.t);
-      else if (moment.kind === "roads") drawRoads(moment.t, layer);
-      else drawSecond(moment.t, layer, secondDrive(story, name));
+      drawMoment(moment, name);
     },
     forget() { view = null; },
+    /** The moment as SVG with lines of words above it; the screen is drawn anew afterwards. */
+    vector(moment, name, words = []) {
+      return onPaper(canvas, canvas, (svg) => {
+        const screenPen = pen;
+        resize();
+        drawStill(svg);
+        pen = svg;
+        drawMoment(moment, name);
+        svg.fillStyle = inks.ink;
+        words.forEach((line, i) => { svg.font = i ? "13px sans-serif" : "700 16px sans-serif"; svg.fillText(line, 16, 26 + 20 * i); });
+        [pen, view] = [screenPen, null];
+      });
+    },
   };
 }

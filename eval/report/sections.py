@@ -62,7 +62,7 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         _titled("Why is it wrong here? The worst places", mapping_places(files, scenario.name)),
         localization_places(files, scenario.name),
         _titled("Breaks", break_table(scenario)),
-        _titled("Figures", _gallery(files.pictures) if files.pictures else None),
+        _titled("Figures", gallery(files.pictures) if files.pictures else None),
         _titled("Stage times", _timings(scenario)),
         element("h3", "Run it again"),
         _commands(scenario, files.evidence),
@@ -167,14 +167,17 @@ def _interactive_map(files: ScenarioFiles) -> Html:
                    class_="map")  # fmt: skip
 
 
-def _gallery(pictures: Sequence[Picture]) -> Html:
+def gallery(pictures: Sequence[Picture]) -> Html:
+    """Figures that open by a click and are saved by buttons."""
     return element("div", [_figure(picture) for picture in pictures], class_="gallery")
 
 
 def _figure(picture: Picture) -> Html:
     image = element("img", src=picture.uri, alt=picture.caption, width=picture.width, height=picture.height)
     button = element("button", image, type="button", class_="enlarge", aria_label=f"Enlarge: {picture.caption}")
-    return element("figure", button, element("figcaption", picture.caption), class_="wide" if picture.width > 1400 else None)
+    kinds = " ".join(kind for kind, has in (("wide", picture.width > 1400), ("photo", picture.photo)) if has) or None
+    drawn = Html(f'<script type="text/plain">{picture.svg}</script>') if picture.svg else None
+    return element("figure", button, drawn, element("figcaption", picture.caption), class_=kinds)
 
 
 def _timings(scenario: ScenarioResult) -> Html | None:

@@ -109,9 +109,7 @@ function tools(box, table, heads) {
     button.setAttribute("aria-label", `Save ${name} as ${format}`);
     button.addEventListener("click", () => {
       const text = write(heads.map((head) => head.text), contentOf(table));
-      const link = make("a", undefined, { href: URL.createObjectURL(new Blob([text], { type: "text/plain;charset=utf-8" })), download: `${fileName(name)}.${ENDINGS[format]}` });
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+      saveAs(`${fileName(name)}.${ENDINGS[format]}`, new Blob([text], { type: "text/plain;charset=utf-8" }));
       navigator.clipboard?.writeText(text).then(() => { said.textContent = `${format}: saved, and copied`; }, () => { said.textContent = `${format}: saved`; });
     });
     bar.append(button);
@@ -120,8 +118,6 @@ function tools(box, table, heads) {
   box.after(bar);
   return said;
 }
-
-const fileName = (name) => name.replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "").slice(0, 60) || "table";
 
 for (const box of document.querySelectorAll(".scroll")) {
   const table = box.querySelector("table");

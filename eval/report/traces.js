@@ -22,16 +22,20 @@ function makeTraces(canvas) {
   const X = (t) => TRACE_LEFT + ((t - drawn.t_s[0]) / Math.max(drawn.t_s.at(-1) - drawn.t_s[0], 1e-9)) * (size.w - 2 * TRACE_LEFT);
 
   function resize(belief) {
-    const w = canvas.clientWidth, h = canvas.clientHeight, ratio = window.devicePixelRatio || 1, style = getComputedStyle(canvas);
+    const w = canvas.clientWidth, h = canvas.clientHeight, ratio = window.devicePixelRatio || 1;
     if (!w || !h) return (size = null);
     [size, drawn] = [{ w, h, ratio }, belief];
-    inks = Object.fromEntries(["line", "soft", "ink", "accent"].map((key) => [key, style.getPropertyValue(`--${key}`).trim()]));
+    inks = inksOf(canvas, ["line", "soft", "ink", "accent"]);
     for (const one of [canvas, still]) { one.width = Math.round(w * ratio); one.height = Math.round(h * ratio); }
-    const on = still.getContext("2d"), tall = h / TRACE_ROWS.length;
-    on.setTransform(ratio, 0, 0, ratio, 0, 0);
+    drawStill(still.getContext("2d"));
+    return size;
+  }
+
+  function drawStill(on) {
+    const tall = size.h / TRACE_ROWS.length;
+    on.setTransform(size.ratio, 0, 0, size.ratio, 0, 0);
     on.font = "12px system-ui, sans-serif";
     TRACE_ROWS.forEach(([key, name], row) => drawRow(on, key, name, row * tall, tall));
-    return size;
   }
 
   function drawRow(on, key, name, top, tall) {
@@ -56,6 +60,10 @@ function makeTraces(canvas) {
 
   return {
     forget() { size = null; },
+    /** Both rows as SVG; the screen is drawn anew afterwards. */
+    vector(belief) {
+      return onPaper(canvas, canvas, (svg) => { resize(belief); drawStill(svg); size = null; });
+    },
     draw(belief, t) {
       if (belief !== drawn) size = null;
       if (!size && !resize(belief)) return;

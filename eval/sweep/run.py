@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from hippodrome._files import write_atomically
 from hippodrome.eval.contest.entry import Added
 from hippodrome.eval.pool import progress_bar
+from hippodrome.eval.report.pages import write_trial_page
 from hippodrome.eval.results.model import Results, to_json, write_results
 from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
 from hippodrome.eval.sweep.cell import ROLES, CellResult, CellTask, RecordingTask, make_recording, run_cell
@@ -21,7 +22,7 @@ from hippodrome.eval.sweep.table import pooled_rows, sweep_markdown
 from hippodrome.sim.record import RecordingPlan
 from hippodrome.sim.render.probe import require_gl
 
-RESULTS, TABLE, CELL = "results.json", "table.md", "cell.json"
+RESULTS, TABLE, PAGE, CELL = "results.json", "table.md", "sweep.html", "cell.json"
 
 
 def sweep(
@@ -70,7 +71,7 @@ def sweep(
         runner.run("cells", run_cell, tasks, ended)
     _merge(cells, {cell: _read(_path(cell, out)) for cell in cells if cell in finished}, failures, out)
     print(f"{len(cells)} cell(s): {kept} kept, {len(finished) - kept} run, {len(failures)} failed\n"
-          f"results: {out / RESULTS}\ntable:   {out / TABLE}")  # fmt: skip
+          f"results: {out / RESULTS}\ntable:   {out / TABLE}\npage:    {out / PAGE}")  # fmt: skip
     for cell, cause in failures.items():
         print(f"failed: {cell.name}: {cause}")
     return not failures
@@ -111,13 +112,15 @@ def _read(path: Path) -> CellResult:
 
 
 def _merge(cells: Sequence[SweepCell], finished: dict[SweepCell, CellResult], failures: dict[SweepCell, str], out: Path) -> None:
-    """``results.json`` as of ``hippodrome eval``, each scenario named with its setting, and the pooled table beside it."""
+    """``results.json`` as of ``hippodrome eval``, each scenario named with its setting; the pooled table and its page."""
     rows = pooled_rows(finished)
     scenarios = tuple(_named(cell, finished[cell]) for cell in cells if cell in finished)
     failed = [(cell.name, failures[cell]) for cell in cells if cell in failures]
     extra: dict[str, Any] = {"pooled": rows, "failures": [{"cell": name, "cause": cause} for name, cause in failed]}
     write_results(out / RESULTS, Results(scenarios=scenarios, **extra))
-    write_atomically(out / TABLE, sweep_markdown(rows, failed).encode())
+    text = sweep_markdown(rows, failed)
+    write_atomically(out / TABLE, text.encode())
+    write_trial_page(out / PAGE, "Sweep", text, command="hippodrome sweep")
 
 
 def _named(cell: SweepCell, found: CellResult) -> Any:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from hippodrome._files import write_atomically
+from hippodrome.eval.report.pages import write_trial_page
 from hippodrome.eval.results.model import to_json
 from hippodrome.eval.trials.robustness.figures import draw_curves, draw_heat_map
 from hippodrome.eval.trials.robustness.findings import Findings, merged
@@ -27,7 +28,7 @@ ALL_TOWNS: Final = "all towns"
 
 
 def report_town(folder: Path, name: str, found: Findings) -> None:
-    """Write ``robustness.json``, ``.md`` and ``.png`` and ``places.png`` of one town into ``folder``, and print the tables."""
+    """Write ``robustness.json``, ``.md``, ``.png``, ``.html`` and ``places.png`` of one town, and print the tables."""
     text = "\n".join([
         conditions_markdown(name, found.table), yardsticks_markdown(found.results), places_markdown(found.places),
         kidnapping_markdown(found.kidnapped), paper_lengths_markdown(found.paper), targets_markdown(found.targets()),
@@ -36,11 +37,12 @@ def report_town(folder: Path, name: str, found: Findings) -> None:
     _write(folder, {"scenario": name, "definition": DEFINITION, "place_definition": RECALL_DEFINITION, **found.summary()}, text)
     draw_heat_map(folder / "robustness.png", name, found.table)
     draw_curves(folder / "places.png", name, found.places)
-    print(f"{text}\nwritten: {folder}/robustness.json, .md, .png, places.png")
+    _write_page(folder, name, text)
+    print(f"{text}\nwritten: {folder}/robustness.json, .md, .png, .html, places.png")
 
 
 def report_towns(out: Path, towns: Mapping[str, Findings]) -> None:
-    """Write ``robustness.json``, ``.md`` and ``.png`` of all towns into ``out``, above those of each town, and print the tables.
+    """Write ``robustness.json``, ``.md``, ``.png``, ``.html`` of all towns into ``out``, above those of each; print the tables.
 
     Figures are pooled over the sequences of all towns; each target is also given town by town, so that the worst is seen.
     """
@@ -53,7 +55,13 @@ def report_towns(out: Path, towns: Mapping[str, Findings]) -> None:
     by_town = {name: {target.item: target.value for target in found} for name, found in targets.items()}
     _write(out, {"towns": by_town, **pooled.summary()}, text)
     draw_heat_map(out / "robustness.png", f"{ALL_TOWNS} ({', '.join(towns)})", pooled.table)
-    print(f"{text}\nwritten: {out}/robustness.json, .md, .png")
+    _write_page(out, ALL_TOWNS, text)
+    print(f"{text}\nwritten: {out}/robustness.json, .md, .png, .html")
+
+
+def _write_page(folder: Path, name: str, text: str) -> None:
+    pictures = [folder / "robustness.png", folder / "places.png"]
+    write_trial_page(folder / "robustness.html", f"Robustness: {name}", text, pictures, "hippodrome robustness")
 
 
 def _write(folder: Path, data: dict[str, Any], text: str) -> None:

@@ -20,6 +20,7 @@ from hippodrome.eval.contest.trials import added_methods
 from hippodrome.eval.figures.stress import draw_stress
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.pool import worker_pool
+from hippodrome.eval.report.pages import write_trial_page
 from hippodrome.eval.results.model import to_json
 from hippodrome.eval.reuse import figure_code_sha256
 from hippodrome.eval.run import make_recordings
@@ -65,7 +66,7 @@ def stress(
     out: Path,
     methods: Sequence[Added] = (),
 ) -> None:
-    """Run cases over scenarios x seeds; write ``stress.json``, ``stress.md`` and ``stress.png``, and print the table.
+    """Run cases over scenarios x seeds; write ``stress.json``, ``.md``, ``.png`` and ``.html``, and print the table.
 
     Args:
         paths: The scenarios' files.
@@ -93,7 +94,8 @@ def stress(
     write_atomically(out / "stress.md", text.encode())
     ours = [row for row in rows if not row.method]
     draw_stress(out / "stress.png", {case.name: [row.ape_mean_m for row in ours if row.case == case.name] for case in cases})
-    print(f"{text}\n{out / 'stress.json'}, {out / 'stress.md'}, {out / 'stress.png'}")
+    write_trial_page(out / "stress.html", "Refinement under stress", text, [out / "stress.png"], "hippodrome stress")
+    print(f"{text}\n{out / 'stress.json'}, {out / 'stress.md'}, {out / 'stress.png'}, {out / 'stress.html'}")
 
 
 def run_cases(task: StressTask) -> list[StressRow]:

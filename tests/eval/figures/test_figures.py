@@ -95,7 +95,9 @@ def test_every_figure_is_drawn_with_ink(tmp_path, name):
 def test_the_same_figure_has_the_same_bytes(tmp_path):
     for name in ("a.png", "b.png"):
         draw_maps_over_truth(tmp_path / name, network(), POSES, {"topometric": POSES})
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    for kind in ("png", "svg"):
+        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+    assert b">topometric</text>" in (tmp_path / "a.svg").read_bytes(), "letters stay letters"
 
 
 def test_the_head_ring_peaks_at_the_mean_and_is_flat_while_uninformed():

@@ -10,10 +10,9 @@ import pytest
 from hippodrome.eval.report.belief import Belief, SecondDrive
 from hippodrome.eval.report.report import write_report
 from hippodrome.eval.results.model import Results, write_results
-from tests.eval.report.test_report import HOSTILE, VERTICES, Page, browse, evidence, needs_browser, scenario
+from tests.eval.report.test_report import HOSTILE, VERTICES, Page, evidence, scenario
 
 FIX = 6  # sample at which the drive is localized
-CLOCK = "<head><script>window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 1);</script>"
 LIMIT_BYTES = 12_000_000
 
 
@@ -45,19 +44,15 @@ def report(tmp_path):
     return write_report(tmp_path)
 
 
-def after(report, folder, script, address=""):
-    """Attributes of the page's body after a script has run in it, and what the console said."""
-    text = report.read_text(encoding="utf-8").replace("<head>", CLOCK)
-    run = f"""<script>addEventListener("load", () => setTimeout(async () => {{
-        const panel = document.querySelector(".panel:not([hidden])");
-        const wait = () => new Promise((done) => setTimeout(done, 150));
-        const say = (key, value) => {{ document.body.dataset[key] = value; }};
-        await wait(); {script} }}, 200));</script></body>"""
-    hashed = f"<script>location.hash = {json.dumps(address)};</script>" if address else ""
-    copy = folder / "copy.html"
-    copy.write_text(text.replace("<body>", f"<body>{hashed}").replace("</body>", run), encoding="utf-8")
-    dom, console = browse(copy, folder)
-    return Page(dom).all("body")[0], console
+def after(browser, report, script, address=""):
+    """What a script said in the page, by key, and what the console said."""
+    tab = browser.open(f"{report.as_uri()}#{address}" if address else report.as_uri())
+    said = tab.run(f"""(async () => {{ const said = {{}}, panel = document.querySelector(".panel:not([hidden])");
+        const wait = () => new Promise((done) => setTimeout(done, 100)), say = (key, value) => {{ said[key] = String(value); }};
+        await wait(); {script}; return said; }})()""")
+    console = tab.complaints()
+    tab.close()
+    return said, console
 
 
 def test_the_data_comes_back_as_it_was(report):
@@ -72,22 +67,20 @@ def test_no_script_makes_markup_of_data(report):
     assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function", scripts)
 
 
-@needs_browser
-def test_an_address_opens_a_time_of_the_second_drive(report, tmp_path):
+def test_an_address_opens_a_time_of_the_second_drive(browser, report):
     script = """say("town", panel.dataset.town); say("words", panel.querySelector(".moment").textContent);
         say("part", panel.querySelector(".player").dataset.part);
         say("fired", panel.querySelector(".fired figcaption").textContent);"""
-    body, console = after(report, tmp_path, script, "town=town%20%26%20co&drive=2&t=40")
+    said, console = after(browser, report, script, "town=town%20%26%20co&drive=2&t=40")
     assert console == []
-    assert (body["data-town"], body["data-part"]) == ("town & co", "find")
+    assert (said["town"], said["part"]) == ("town & co", "find")
     half_axis_m = 2.4477 * np.sqrt(np.linalg.eigvalsh([[1.0, 0.2], [0.2, 2.0]])[-1])
-    assert "Second drive, 40.0 s" in body["data-words"] and f"95 % sure within {half_axis_m:.2f} m" in body["data-words"]
-    assert "truly 1.50 m off" in body["data-words"]
-    assert body["data-fired"] == "view of 30 s fired; frame of 30 s"
+    assert "Second drive, 40.0 s" in said["words"] and f"95 % sure within {half_axis_m:.2f} m" in said["words"]
+    assert "truly 1.50 m off" in said["words"]
+    assert said["fired"] == "view of 30 s fired; frame of 30 s"
 
 
-@needs_browser
-def test_every_control_moves_the_story(report, tmp_path):
+def test_every_control_moves_the_story(browser, report):
     script = """const player = panel.querySelector(".player"), chart = player.querySelector(".chart");
         const at = () => Number(chart.getAttribute("aria-valuenow"));
         const press = async (key) => {
@@ -100,28 +93,26 @@ def test_every_control_moves_the_story(report, tmp_path):
         await press("Home"); player.querySelector(".speed").value = "4"; play.click(); await wait(); await wait();
         say("moved", at() > 0);
         await press(" "); say("paused", play.getAttribute("aria-pressed"));"""
-    body, console = after(report, tmp_path, script, "scenario-1")
+    said, console = after(browser, report, script, "scenario-1")
     assert console == []
-    assert body["data-keys"] == "0 50 45 1000"
-    assert [body[f"data-{part}"] for part in ("map", "roads", "find")] == ["map", "roads", "find"]
-    assert (body["data-moved"], body["data-paused"]) == ("true", "false")
+    assert said["keys"] == "0 50 45 1000"
+    assert [said[f"{part}"] for part in ("map", "roads", "find")] == ["map", "roads", "find"]
+    assert (said["moved"], said["paused"]) == ("true", "false")
 
 
-@needs_browser
-def test_the_first_tab_compares_and_tabs_go_by_keyboard(report, tmp_path):
+def test_the_first_tab_compares_and_tabs_go_by_keyboard(browser, report):
     script = """say("first", panel.id); const tabs = [...document.querySelectorAll("[role=tab]")];
         tabs[0].dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true })); await wait();
         say("next", document.querySelector(".panel:not([hidden])").id);
         say("selected", tabs.map((tab) => tab.ariaSelected).join(" "));
         say("cards", document.querySelectorAll(".town").length);"""
-    body, console = after(report, tmp_path, script)
+    said, console = after(browser, report, script)
     assert console == []
-    assert (body["data-first"], body["data-next"], body["data-cards"]) == ("compare", "scenario-1", "1")
-    assert body["data-selected"] == "false true false"
+    assert (said["first"], said["next"], said["cards"]) == ("compare", "scenario-1", "1")
+    assert said["selected"] == "false true false"
 
 
-@needs_browser
-def test_tables_sort_filter_and_are_written_in_four_formats(report, tmp_path):
+def test_tables_sort_filter_and_are_written_in_four_formats(browser, report):
     script = """const box = panel.querySelector('[aria-label$=": mapping"]'), table = box.querySelector("table");
         const names = () => [...table.tBodies[0].rows].filter((row) => !row.hidden).map((row) => textOf(row.cells[0])).join("|");
         table.querySelectorAll(".sort")[1].click(); say("sorted", names());
@@ -132,12 +123,12 @@ def test_tables_sort_filter_and_are_written_in_four_formats(report, tmp_path):
         const cells = [["a", "b (m)"], [["x|y_1", "<0.1"], ['=1+1', '-2']]];
         say("csv", asCsv(...cells)); say("json", asJson(...cells)); say("latex", asLatex(...cells));
         say("markdown", asMarkdown(...cells));"""
-    body, console = after(report, tmp_path, script, "scenario-1")
+    said, console = after(browser, report, script, "scenario-1")
     assert console == []
-    assert body["data-sorted"].split("|")[0] == "topometric" and body["data-best"] == "0.50"
-    assert body["data-filtered"] == "dead reckoning"
-    assert body["data-csv"].splitlines() == ['"a","b (m)"', '"x|y_1","<0.1"', '"\'=1+1","-2"']
-    assert json.loads(body["data-json"]) == [{"a": "x|y_1", "b (m)": "<0.1"}, {"a": "=1+1", "b (m)": "-2"}]
-    assert r"x|y\_1 & $<$0.1 \\" in body["data-latex"]
-    assert r"| x\|y_1 | <0.1 |" in body["data-markdown"]
-    assert int(body["data-width"]) <= 0
+    assert said["sorted"].split("|")[0] == "topometric" and said["best"] == "0.50"
+    assert said["filtered"] == "dead reckoning"
+    assert said["csv"].splitlines() == ['"a","b (m)"', '"x|y_1","<0.1"', '"\'=1+1","-2"']
+    assert json.loads(said["json"]) == [{"a": "x|y_1", "b (m)": "<0.1"}, {"a": "=1+1", "b (m)": "-2"}]
+    assert r"x|y\_1 & $<$0.1 \\" in said["latex"]
+    assert r"| x\|y_1 | <0.1 |" in said["markdown"]
+    assert int(said["width"]) <= 0

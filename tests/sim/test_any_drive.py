@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hippodrome.sim.drive import simulate_drive
-from hippodrome.sim.ego import EgoSpec
+from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.lane_log import LaneLog, lane_pieces
 from hippodrome.sim.network import read_network
 from hippodrome.sim.sumo_tools import run_tool

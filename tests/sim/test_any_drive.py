@@ -82,7 +82,9 @@ SQUARE = "".join(f'<node id="{name}" x="{x}" y="{y}"/>' for name, x, y in (
 
 
 def test_nobody_meets_the_ego_on_a_lane_for_both_ways(tmp_path):
-    ways = "".join(f'<edge id="{a}{b}" from="{a}" to="{b}" speed="9"/>' for a, b in ("BC", "CB", "CD", "DC", "DA", "AD", "BD", "DB"))
+    ways = "".join(
+        f'<edge id="{a}{b}" from="{a}" to="{b}" speed="9"/>' for a, b in ("BC", "CB", "CD", "DC", "DA", "AD", "BD", "DB")
+    )
     lane = "".join(f'<edge id="{a}{b}" from="{a}" to="{b}" speed="9" spreadType="center"/>' for a, b in ("AB", "BA"))
     square = town(tmp_path, SQUARE, ways + lane, "--edges.join-tram-dist=-1", "--geometry.remove=false")
     text = square.net_file.read_text()

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray
-from hippodrome.sim.ego import LENGTH_M, REAR_AXLE_TO_FRONT_M, WHEELBASE_M, EgoSpec, Track, follow, wander_m
+from hippodrome.sim.ego_spec import LENGTH_M, REAR_AXLE_TO_FRONT_M, WHEELBASE_M, EgoSpec
 from hippodrome.sim.lane_log import driven_edges, lane_pieces
 from hippodrome.sim.net_heights import heights_along_m, pitch_rad
 from hippodrome.sim.path import Piece, piece_starts, sample_count, smooth_path
@@ -20,6 +20,9 @@ from hippodrome.sim.sumo_run import SUMO_STEP_S, BackgroundTraffic, sumo_run
 from hippodrome.sim.tour import TourGraph, TourSpec, coverage_and_revisits, tour_graph, toured_area
 from hippodrome.sim.traffic import TrafficSpec, vehicle_types_xml
 from hippodrome.sim.types import Drive, Town
+
+if TYPE_CHECKING:
+    from hippodrome.sim.ego import Track
 
 DRIVE_STEP_S: Final = 0.05  # of the ego's car; two steps to one of SUMO's
 ROAM_PER_VEHICLE_M: Final = 200.0  # traffic uses the tour's area and as much around it as keeps queues at signals short
@@ -44,6 +47,8 @@ def _as_drive(town: Town, graph: TourGraph, log: DriveLog, ego: EgoSpec, rng: np
 
     The bicycle is driven seen from above; SUMO's speeds are along the slope, and so are the drive's.
     """
+    from hippodrome.sim.ego import follow, wander_m  # takes seconds to load, and who reads a recording drives nothing
+
     network = town.network
     pieces, front_m = lane_pieces(network, log.lanes(), from_lane_start=True)
     aside = wander_m(sample_count(pieces), ego.lateral_wander_m, rng) if ego.lateral_wander_m > 0.0 else None

@@ -1,4 +1,4 @@
-"""The ego vehicle: how fast it dares to go, and highway-env's kinematic bicycle that follows the path."""
+"""The ego vehicle: highway-env's kinematic bicycle that follows the path."""
 
 from __future__ import annotations
 
@@ -8,25 +8,18 @@ from typing import Final
 
 import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
-from pydantic import Field
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import lfilter
 
 from hippodrome.core.types import FloatArray
+from hippodrome.sim.ego_spec import MIN_CREEP_MPS, WHEELBASE_M
 from hippodrome.sim.path import STEP_M, Path
-from hippodrome.sim.spec import Spec
 
-WHEELBASE_M: Final = 2.7  # a compact car
-LENGTH_M: Final = 4.5
-REAR_AXLE_TO_FRONT_M: Final = 3.6  # rear axle to front bumper, which is what SUMO calls a vehicle's position
 MAX_STEERING_RAD: Final = math.radians(42.0)  # turning circle of 10.2 m at the outer wheel: a small car's
 MAX_CURVATURE_1PM: Final = math.tan(MAX_STEERING_RAD) / WHEELBASE_M
 MAX_STEERING_RATE_RADPS: Final = 0.9  # road wheel; a quick turn of the steering wheel
-MAX_YAW_RATE_RADPS: Final = 0.75  # what turns are driven at; leaves room below 0.9 for steering back to the path
 LIMIT_LATERAL_MPS2: Final = 3.0  # what the car itself never exceeds, also while it steers back to the path
 LIMIT_YAW_RADPS: Final = 0.85
 SAFE_GAIN_1PS: Final = 4.0  # brakes for its own steering within a quarter of a second
-MIN_CREEP_MPS: Final = 1.0  # in the tightest turns
 ERROR_DECAY_M: Final = 3.0  # distance over which an offset from the path fades, at low speed
 ERROR_DECAY_S: Final = 0.5  # and the time it takes at least: a driver's reaction
 PREVIEW_S: Final = 0.15  # the steering looks ahead by about the delay of its own rate limit
@@ -38,15 +31,6 @@ MAX_ACCEL_MPS2: Final = 4.0
 MAX_BRAKE_MPS2: Final = 8.0
 WANDER_LENGTH_M: Final = 50.0  # correlation length of a driver's drift within the lane
 WANDER_ROUNDING_M: Final = 6.0  # the drift's own smoothness, so that it adds hardly any curvature
-
-
-class EgoSpec(Spec):
-    """How the ego drives."""
-
-    lateral_accel_mps2: float = Field(2.5, gt=0.2, le=3.0)
-    accel_mps2: float = Field(1.8, gt=0.2, le=4.0)
-    decel_mps2: float = Field(2.0, gt=0.2, le=4.0)
-    lateral_wander_m: float = Field(0.0, ge=0.0, le=1.0)  # standard deviation of the drift about the lane's centre
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,20 +55,10 @@ class EgoCar(Vehicle):  # type: ignore[misc]
         return self.position[0] - half * math.cos(self.heading), self.position[1] - half * math.sin(self.heading)
 
 
-def comfortable_speed_mps(path: Path, limit_mps: FloatArray, spec: EgoSpec) -> FloatArray:
-    """Highest du/dt (n,) along a path: the limit, v^2 kappa <= a_lat, v kappa <= yaw limit, braking in time for the rest."""
-    curvature = np.maximum(np.abs(path.curvature_1pm), 1e-6)
-    bends = np.minimum(np.sqrt(spec.lateral_accel_mps2 / curvature), MAX_YAW_RATE_RADPS / curvature)
-    allowed = np.minimum(limit_mps, np.maximum(bends, MIN_CREEP_MPS) / path.stretch)
-    braking = 2.0 * spec.decel_mps2 * STEP_M * np.arange(len(allowed))
-    # v(i)^2 <= v(j)^2 + 2 b (u_j - u_i) for all j >= i
-    latest = np.minimum.accumulate((allowed**2 + braking)[::-1])[::-1]
-    speed: FloatArray = np.sqrt(latest - braking)
-    return speed
-
-
 def wander_m(count: int, sigma_m: float, rng: np.random.Generator) -> FloatArray:
     """Smooth Ornstein-Uhlenbeck drift (count,) along the path: deviation ``sigma_m``, correlated over ``WANDER_LENGTH_M``."""
+    from scipy.signal import lfilter  # takes a second to load, and most drives do not wander
+
     decay = math.exp(-STEP_M / WANDER_LENGTH_M)
     warm_up = int(4 * WANDER_LENGTH_M / STEP_M)
     noise = rng.standard_normal(count + warm_up) * math.sqrt(1.0 - decay**2)

@@ -145,8 +145,14 @@ def _is_internal(lane: SumoLane) -> bool:
 
 
 def _successors(lane: SumoLane, index: dict[str, int]) -> list[int]:
-    """Next lane of each connection: its first internal lane, whose own connection tells the next piece of the chain."""
-    after = (link.getViaLaneID() or link.getToLane().getID() for link in lane.getOutgoing() if link.allows("passenger"))
+    """Next lane of each connection: its first internal lane, whose own connection tells the next piece of the chain.
+
+    From a lane for both directions nobody turns round onto the same lane, though netconvert writes such connections: SUMO's
+    vehicle would wait for itself.
+    """
+    same = lane.getEdge().getBidi()
+    links = (link for link in lane.getOutgoing() if link.allows("passenger") and (same is None or link.getTo() is not same))
+    after = (link.getViaLaneID() or link.getToLane().getID() for link in links)
     return sorted({index[lane_id] for lane_id in after if lane_id in index})
 
 

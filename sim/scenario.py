@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from hippodrome.core.localization.localizer import LocalizerConfig
 from hippodrome.core.mapping.mapper import MapperConfig
 from hippodrome.core.refinement.refine import RefineConfig
-from hippodrome.sim.ego import EgoSpec
+from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.episode import camera_divider
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.renamed import with_present_names

@@ -15,7 +15,7 @@ from hippodrome._folders import temporary_folder
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 from hippodrome.sim.network import HELD_PHASE_S
-from hippodrome.sim.sumo_tools import without_comma
+from hippodrome.sim.sumo_tools import without_comma, without_connectors
 from hippodrome.sim.tour import TourGraph
 from hippodrome.sim.traffic import KIND_SHARES, VEHICLE_SIZES_M, TrafficSpec, random_trip
 
@@ -30,7 +30,7 @@ SIGHT_M: Final = 150.0  # vehicles farther from the ego are not logged
 @contextmanager
 def sumo_run(net_file: Path, vehicle_types: str, seed: int) -> Iterator[None]:
     """Starts SUMO on a network in this process and closes it whatever happens."""
-    with temporary_folder() as folder, without_comma(net_file) as named:
+    with temporary_folder() as folder, without_connectors(net_file) as plain, without_comma(plain) as named:
         types_file = folder / "types.add.xml"
         types_file.write_text(vehicle_types, encoding="utf-8")
         options = (

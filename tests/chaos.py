@@ -33,11 +33,18 @@ odometry_rate_hz: 4
 mapping: {tour: {length_m: 400}, traffic: {vehicles: 1}}
 localization: {tour: {length_m: 120}, traffic: {vehicles: 0}}
 """
-LONGEST_S: Final = 240  # of a command: one that takes longer hangs
+LONGEST_S: Final = 240  # of a command: one that takes longer hangs, unless an undisturbed one takes a sixth of its time, too
+SLOWER: Final = 6  # times that a command may take of an undisturbed one, as others may use the machine
 ORPHAN_S: Final = 5.0  # after this no process of a command that ended is there any more
 ENDS: Final = {"main": (2, 129, 130, 143, -9), "worker": (0, 1, 2), "all": (2, 129, 130, 143, -9, -15, -1, -2)}
 SIGNALS: Final = ("SIGTERM", "SIGHUP", "SIGINT", "SIGKILL")
-COMMANDS: Final = {"eval": ("eval",), "sweep": ("sweep", "--set", "localizer.mode=coupled,kalman")}
+COMMANDS: Final = {
+    "baselines": ("baselines", "--seconds", "20", "--runs", "1"),
+    "cell": ("sweep", "--set", "localizer.mode=coupled"),  # the cheapest, for the suite
+    "eval": ("eval",),
+    "sweep": ("sweep", "--set", "localizer.mode=coupled,kalman"),
+}
+USUAL: Final = ("eval", "sweep")  # of a campaign; a share of its kills hits ``baselines`` where ORB-SLAM3 is installed
 # A cluster as docs/sweeps.md sets it up, in one process: its address, then the numbers of its workers.
 CLUSTER: Final = """
 import distributed, sys, time
@@ -61,12 +68,14 @@ class Attempt:
     share: float  # of the time of an undisturbed run, after which it comes
 
 
-def attempt_of(seed: int, number: int, dask: bool) -> Attempt:
-    """The attempt of this number; the same for the same seed."""
+def attempt_of(seed: int, number: int, dask: bool, baselines: bool = False) -> Attempt:
+    """The attempt of this number; the same for the same seed. Each sixth one is of ``baselines``, if that is wanted."""
     rng = np.random.default_rng([seed, number])
     targets, shares = (("main", "worker", "all", "dask"), (0.4, 0.3, 0.2, 0.1)) if dask else (("main", "worker", "all"), None)
     target = str(rng.choice(targets, p=shares))
-    command = "sweep" if target == "dask" else str(rng.choice(sorted(COMMANDS)))
+    command = "sweep" if target == "dask" else str(rng.choice(USUAL))
+    if baselines and number % 6 == 5 and target != "dask":
+        command = "baselines"
     kinds = ("SIGTERM", "SIGKILL") if target == "dask" else SIGNALS
     return Attempt(command, target, str(rng.choice(kinds)), float(rng.uniform(0.05, 1.0)))
 
@@ -84,7 +93,8 @@ class Chaos:
 
     def start(self, command: str, out: Path, *more: str) -> subprocess.Popen[str]:
         """A command in a session of its own, with a folder of its own for temporary files."""
-        words = [*COMMANDS[command], str(self.scenario), *(more or ("--workers", "2")), "--out", str(out)]
+        usual = ("--workers", "1" if command == "cell" else "2")
+        words = [*COMMANDS[command], str(self.scenario), *(more or usual), "--out", str(out)]
         environment = {**os.environ, "TMPDIR": str(self.temporary)}
         return subprocess.Popen([sys.executable, "-m", "hippodrome.eval.cli", *words], env=environment, start_new_session=True,
                                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)  # fmt: skip
@@ -94,16 +104,15 @@ class Chaos:
         out = self.folder / f"whole-{command}"
         if command not in self.took_s:
             began = time.monotonic()
-            status, said = self.ended(self.start(command, out))
+            status, said = self.ended(self.start(command, out), SLOWER * LONGEST_S)
             assert status == 0, said
             self.took_s[command] = time.monotonic() - began
         return out
 
-    @staticmethod
-    def ended(process: subprocess.Popen[str]) -> tuple[int | None, str]:
+    def ended(self, process: subprocess.Popen[str], longest_s: float = LONGEST_S) -> tuple[int | None, str]:
         """Exit status and complaints; None for one that hangs, which is killed with all its session."""
         try:
-            said = process.communicate(timeout=LONGEST_S)[1]
+            said = process.communicate(timeout=max(longest_s, SLOWER * max(self.took_s.values(), default=0.0)))[1]
             return process.returncode, said
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
@@ -216,11 +225,13 @@ def _kill(pid: int, number: str) -> None:
         os.kill(pid, getattr(signal, number))
 
 
-def campaign(folder: Path, kills: int, pairs: int, seed: int, most_s: float, dask: bool) -> list[tuple[str, list[str]]]:
+def campaign(
+    folder: Path, kills: int, pairs: int, seed: int, most_s: float, dask: bool, baselines: bool
+) -> list[tuple[str, list[str]]]:
     """What was done, and what was wrong each time; less where ``most_s`` are over before."""
     chaos, found, end_s = Chaos(folder), list[tuple[str, list[str]]](), time.monotonic() + most_s
     rng = np.random.default_rng([seed, 1])
-    plans = [(f"kill-{number}", attempt_of(seed, number, dask)) for number in range(kills)]
+    plans = [(f"kill-{number}", attempt_of(seed, number, dask, baselines)) for number in range(kills)]
     for name, attempt in plans:
         if time.monotonic() > end_s:
             return found
@@ -230,7 +241,7 @@ def campaign(folder: Path, kills: int, pairs: int, seed: int, most_s: float, das
     for number in range(pairs):
         if time.monotonic() > end_s:
             return found
-        command, delay_s = sorted(COMMANDS)[number % 2], float(rng.uniform(0.0, 6.0))
+        command, delay_s = USUAL[number % 2], float(rng.uniform(0.0, 6.0))
         what = f"pair-{number}: two of {command}, {delay_s:.1f} s apart"
         found.append((what, chaos.pair(f"pair-{number}", command, delay_s)))
         print(what, *found[-1][1] or ["ok"], sep="\n  ", flush=True)
@@ -242,6 +253,9 @@ def _main() -> int:
     parser.add_argument("--kills", type=int, default=20, help="how many commands are killed (default: 20)")
     parser.add_argument("--pairs", type=int, default=4, help="how many pairs run in one folder (default: 4)")
     parser.add_argument("--seed", type=int, default=0, help="of what is hit, by what, and when (default: 0)")
+    parser.add_argument(
+        "--baselines", action="store_true", help="hit the command that runs ORB-SLAM3, too; installs it if need be"
+    )
     parser.add_argument("--seconds", type=float, default=3600.0, help="after these nothing new is begun (default: 3600)")
     options = parser.parse_args()
     try:
@@ -254,7 +268,8 @@ def _main() -> int:
     print(f"{options.kills} kills and {options.pairs} pairs, seed {options.seed}; limits: {LONGEST_S} s a command, "
           f"{options.seconds:g} s in all", flush=True)  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
-        found = campaign(Path(folder), options.kills, options.pairs, options.seed, options.seconds, dask)
+        found = campaign(Path(folder), options.kills, options.pairs, options.seed, options.seconds, dask,
+                         options.baselines)  # fmt: skip
     counts = Counter(fault.partition(":")[0] for _, faults in found for fault in faults)
     kinds = {"traceback": "tracebacks", "hang": "hangs", "orphan": "with orphans", "leftover": "leftovers",
              "changed": "lost or changed", "ended": "ended otherwise"}  # fmt: skip

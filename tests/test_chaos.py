@@ -8,7 +8,7 @@ import pytest
 
 from tests.chaos import Attempt, Chaos, attempt_of, session
 
-ENOUGH_S = 25.0  # a slow machine leaves the pair to ``make chaos``
+ENOUGH_S = 30.0  # a slow machine leaves the pair to ``make chaos``
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 
 
@@ -16,9 +16,9 @@ def test_a_killed_command_and_a_pair_in_one_folder(tmp_path):
     """A kill, and more of what the campaign does as far as half a minute reaches."""
     chaos = Chaos(tmp_path)
     began = time.monotonic()
-    assert chaos.killed("kill", Attempt("eval", "main", "SIGKILL", 0.6)) == []
+    assert chaos.killed("kill", Attempt("cell", "main", "SIGKILL", 0.6)) == []
     if time.monotonic() - began < ENOUGH_S:
-        assert chaos.pair("kill", "eval", 0.0) == []  # what is done by now is kept
+        assert chaos.pair("kill", "cell", 0.0) == []  # what is done by now is kept
 
 
 def test_what_falls_is_told(tmp_path):
@@ -42,3 +42,5 @@ def test_attempts_are_those_of_the_seed():
     assert attempts == [attempt_of(3, number, True) for number in range(60)]
     assert {one.target for one in attempts} == {"main", "worker", "all", "dask"}
     assert {one.number for one in attempts} == {"SIGTERM", "SIGHUP", "SIGINT", "SIGKILL"}
+    assert {one.command for one in attempts} == {"eval", "sweep"}
+    assert "baselines" in {attempt_of(3, number, True, baselines=True).command for number in range(12)}

@@ -6,7 +6,6 @@ import csv
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree
@@ -14,10 +13,10 @@ from xml.etree import ElementTree
 import numpy as np
 
 from hippodrome.core.types import FloatArray
+from hippodrome.eval.files.fix_values import RANGE_ERROR_M, Fix, as_number, file_bytes, file_text, hdop_note, time_s
+from hippodrome.eval.files.nmea import nmea_fixes
 from hippodrome.eval.metrics.association import TrajectoryError
 
-MAX_FIX_BYTES: Final = 128 << 20  # a day of GPX at 10 Hz
-RANGE_ERROR_M: Final = 4.0  # sigma of a position at a dilution (HDOP) of 1, single-frequency receiver under open sky
 TIME_NAMES: Final = ("t_s", "t", "time", "timestamp", "time_s", "epoch", "utc", "datetime", "date_time")
 LAT_NAMES: Final = ("lat", "latitude", "lat_deg", "latitude_deg")
 LON_NAMES: Final = ("lon", "lng", "long", "longitude", "lon_deg", "longitude_deg")
@@ -35,14 +34,6 @@ class Fixes:
     lon_deg: FloatArray  # (N,)
     sigma_m: FloatArray | None  # (N,) standard deviation of a position along one axis; None: the file does not say
     notes: tuple[str, ...]  # what was left out, and how the accuracy was told
-
-
-@dataclass(frozen=True, slots=True)
-class _Fix:
-    t_s: float
-    lat_deg: float
-    lon_deg: float
-    sigma_m: float = np.nan
 
 
 def is_fix_file(path: Path) -> bool:
@@ -71,8 +62,8 @@ def read_fixes(path: Path) -> Fixes:
     """
     if path.is_dir():
         return _checked(path, list(_oxts(path)), [])
-    data = _bytes(path)
-    text = _text(path, data)
+    data = file_bytes(path)
+    text = file_text(path, data)
     start = text.lstrip()
     notes: list[str] = []
     if start.startswith("<"):
@@ -80,13 +71,13 @@ def read_fixes(path: Path) -> Fixes:
     elif start.startswith("{"):
         rows = list(_geojson(path, text))
     elif start.startswith(("$", "!")):
-        rows = _nmea(path, text, notes)
+        rows = nmea_fixes(path, text, notes)
     else:
         rows = list(_csv(path, text, notes))
     return _checked(path, rows, notes)
 
 
-def _checked(path: Path, rows: Sequence[_Fix], notes: list[str]) -> Fixes:
+def _checked(path: Path, rows: Sequence[Fix], notes: list[str]) -> Fixes:
     if not rows:
         raise TrajectoryError(f"{path}: no fixes with a time in it")
     table = np.array([(row.t_s, row.lat_deg, row.lon_deg, row.sigma_m) for row in rows])
@@ -110,23 +101,7 @@ def _checked(path: Path, rows: Sequence[_Fix], notes: list[str]) -> Fixes:
     return Fixes(table[:, 0], table[:, 1], table[:, 2], sigma_m, tuple(notes))
 
 
-def _bytes(path: Path) -> bytes:
-    try:
-        if (size := path.stat().st_size) > MAX_FIX_BYTES:
-            raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_FIX_BYTES}; cut the track to the drive")
-        return path.read_bytes()
-    except OSError as error:
-        raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
-
-
-def _text(path: Path, data: bytes) -> str:
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise TrajectoryError(f"{path}: byte {error.start}: not UTF-8 text; save the file as UTF-8") from None
-
-
-def _gpx(path: Path, data: bytes, notes: list[str]) -> Iterator[_Fix]:
+def _gpx(path: Path, data: bytes, notes: list[str]) -> Iterator[Fix]:
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise TrajectoryError(f"{path}: has a DOCTYPE or entities, which no GPX file needs; remove them")
     try:
@@ -141,17 +116,17 @@ def _gpx(path: Path, data: bytes, notes: list[str]) -> Iterator[_Fix]:
             untimed += 1
             continue
         by_hdop = by_hdop or "hdop" in inner
-        sigma_m = RANGE_ERROR_M * _number(inner["hdop"], where) if inner.get("hdop") else np.nan
-        yield _Fix(
-            _time_s(inner["time"], where), _number(point.get("lat", ""), where), _number(point.get("lon", ""), where), sigma_m
+        sigma_m = RANGE_ERROR_M * as_number(inner["hdop"], where) if inner.get("hdop") else np.nan
+        yield Fix(
+            time_s(inner["time"], where), as_number(point.get("lat", ""), where), as_number(point.get("lon", ""), where), sigma_m
         )
     if untimed:
         notes.append(f"{untimed} track point(s) without a time are left out")
     if by_hdop:
-        notes.append(_hdop_note())
+        notes.append(hdop_note())
 
 
-def _csv(path: Path, text: str, notes: list[str]) -> Iterator[_Fix]:
+def _csv(path: Path, text: str, notes: list[str]) -> Iterator[Fix]:
     lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), start=1) if line.strip()]
     if not lines:
         raise TrajectoryError(f"{path}: empty")
@@ -166,7 +141,7 @@ def _csv(path: Path, text: str, notes: list[str]) -> Iterator[_Fix]:
         )
     sigma, hdop = _column(names, SIGMA_NAMES), _column(names, HDOP_NAMES)
     if sigma is None and hdop is not None:
-        notes.append(_hdop_note())
+        notes.append(hdop_note())
     for number, line in lines[1:]:
         if line.startswith("#"):
             continue
@@ -176,46 +151,13 @@ def _csv(path: Path, text: str, notes: list[str]) -> Iterator[_Fix]:
             raise TrajectoryError(f"{where}: {len(words)} columns, the first line names {len(names)}")
         accuracy = np.nan
         if sigma is not None:
-            accuracy = _number(words[sigma], where) if words[sigma].strip() else np.nan
+            accuracy = as_number(words[sigma], where) if words[sigma].strip() else np.nan
         elif hdop is not None:
-            accuracy = RANGE_ERROR_M * _number(words[hdop], where) if words[hdop].strip() else np.nan
-        yield _Fix(_time_s(words[t], where), _number(words[lat], where), _number(words[lon], where), accuracy)
+            accuracy = RANGE_ERROR_M * as_number(words[hdop], where) if words[hdop].strip() else np.nan
+        yield Fix(time_s(words[t], where), as_number(words[lat], where), as_number(words[lon], where), accuracy)
 
 
-def _nmea(path: Path, text: str, notes: list[str]) -> list[_Fix]:
-    """Places of RMC, which says the date, with the HDOP of the GGA of the same instant; GGA alone gives seconds of the day."""
-    full, of_day, accuracy_m, bad = list[tuple[str, _Fix]](), list[_Fix](), dict[str, float](), 0
-    days, before_s = 0, -1.0
-    for number, line in enumerate(text.splitlines(), start=1):
-        words, where = line.strip().split("*")[0].split(","), f"{path}: line {number}"
-        kind = words[0][-3:]
-        if kind not in ("RMC", "GGA"):
-            continue
-        if not _checksum_holds(line.strip()):
-            bad += 1
-            continue
-        if kind == "GGA" and len(words) > 8 and words[6] not in ("", "0"):
-            clock_s = _clock_s(words[1], where)
-            days += clock_s < before_s - 43200.0
-            before_s = clock_s
-            accuracy_m[words[1]] = RANGE_ERROR_M * _number(words[8], where) if words[8] else np.nan
-            place = _nmea_deg(words[2], words[3], where), _nmea_deg(words[4], words[5], where)
-            of_day.append(_Fix(clock_s + 86400.0 * days, *place, accuracy_m[words[1]]))
-        elif kind == "RMC" and len(words) > 9 and words[2] == "A":
-            place = _nmea_deg(words[3], words[4], where), _nmea_deg(words[5], words[6], where)
-            full.append((words[1], _Fix(_date_s(words[9], where) + _clock_s(words[1], where), *place)))
-    if bad:
-        notes.append(f"{bad} sentence(s) with a wrong checksum are left out")
-    if accuracy_m:
-        notes.append(_hdop_note())
-    if full:
-        return [_Fix(fix.t_s, fix.lat_deg, fix.lon_deg, accuracy_m.get(clock, np.nan)) for clock, fix in full]
-    if of_day:
-        notes.append("the sentences say no date: times are seconds of the day")
-    return of_day
-
-
-def _geojson(path: Path, text: str) -> Iterator[_Fix]:
+def _geojson(path: Path, text: str) -> Iterator[Fix]:
     try:
         content: Any = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -243,7 +185,7 @@ def _geojson(path: Path, text: str) -> Iterator[_Fix]:
             where = f"{path}: feature {number}: place {place}"
             if not isinstance(at, list) or len(at) < 2:
                 raise TrajectoryError(f"{where}: not a longitude and a latitude")
-            yield _Fix(_time_s(str(time), where), _number(at[1], where), _number(at[0], where))
+            yield Fix(time_s(str(time), where), as_number(at[1], where), as_number(at[0], where))
     if not lines:
         raise TrajectoryError(f"{path}: no Feature with a LineString in it")
 
@@ -253,77 +195,19 @@ def _oxts_folder(path: Path) -> Path | None:
                  and next((folder / "data").glob("*.txt"), None) is not None), None)  # fmt: skip
 
 
-def _oxts(path: Path) -> Iterator[_Fix]:
+def _oxts(path: Path) -> Iterator[Fix]:
     if (folder := _oxts_folder(path)) is None:
         raise TrajectoryError(f"{path}: no OXTS data in it (oxts/timestamps.txt, oxts/data/*.txt)")
-    times = _text(folder / "timestamps.txt", _bytes(folder / "timestamps.txt")).split("\n")
+    times = file_text(folder / "timestamps.txt", file_bytes(folder / "timestamps.txt")).split("\n")
     for file in sorted((folder / "data").glob("*.txt")):
         where, number = str(file), int(file.stem) if file.stem.isdecimal() else -1
         if not 0 <= number < len(times):
             raise TrajectoryError(f"{where}: no line {number + 1} in timestamps.txt")
-        words = _text(file, _bytes(file)).split()
+        words = file_text(file, file_bytes(file)).split()
         if len(words) < 2:
             raise TrajectoryError(f"{where}: {len(words)} columns, expected latitude, longitude and more")
-        accuracy = _number(words[OXTS_ACCURACY], where) if len(words) > OXTS_ACCURACY else np.nan
-        yield _Fix(_time_s(times[number], where), _number(words[0], where), _number(words[1], where), accuracy)
-
-
-def _time_s(text: str, where: str) -> float:
-    """Seconds, of a number, or a date and time (UTC unless it says); milli-, micro- and nanoseconds since 1970 by their size."""
-    text = text.strip()
-    try:
-        value = float(text)
-    except ValueError:
-        try:
-            found = datetime.fromisoformat(text[:26] if len(text) > 26 and text[26:].isdecimal() else text)
-        except (ValueError, OverflowError):
-            raise TrajectoryError(
-                f"{where}: '{text[:40]}' is neither seconds nor a date and time (2026-05-01T12:00:00Z)"
-            ) from None
-        return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp()
-    for above, unit_s in ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)):
-        if abs(value) > above:
-            return value * unit_s
-    return value
-
-
-def _clock_s(word: str, where: str) -> float:
-    if len(word) < 6 or not word[:6].isdecimal():
-        raise TrajectoryError(f"{where}: '{word[:20]}' is no time of day (hhmmss)")
-    return 3600.0 * int(word[:2]) + 60.0 * int(word[2:4]) + _number(word[4:], where)
-
-
-def _date_s(word: str, where: str) -> float:
-    try:
-        day = date(2000 + int(word[4:6]), int(word[2:4]), int(word[:2]))
-    except ValueError:
-        raise TrajectoryError(f"{where}: '{word[:20]}' is no date (ddmmyy)") from None
-    return (datetime(day.year, day.month, day.day, tzinfo=UTC) - datetime(1970, 1, 1, tzinfo=UTC)) / timedelta(seconds=1)
-
-
-def _nmea_deg(word: str, side: str, where: str) -> float:
-    digits = word.partition(".")[0]
-    if len(digits) < 3 or side not in ("N", "S", "E", "W"):
-        raise TrajectoryError(f"{where}: '{word[:20]},{side[:2]}' is no place (ddmm.mmmm,N)")
-    degrees = _number(digits[:-2], where) + _number(word[len(digits) - 2 :], where) / 60.0
-    return -degrees if side in ("S", "W") else degrees
-
-
-def _checksum_holds(line: str) -> bool:
-    body, star, said = line.lstrip("$!").partition("*")
-    if not star:
-        return True
-    total = 0
-    for character in body.encode():
-        total ^= character
-    return said[:2].upper() == f"{total:02X}"
-
-
-def _number(text: Any, where: str) -> float:
-    try:
-        return float(text)
-    except (ValueError, TypeError, OverflowError):
-        raise TrajectoryError(f"{where}: '{str(text)[:40]}' is not a number") from None
+        accuracy = as_number(words[OXTS_ACCURACY], where) if len(words) > OXTS_ACCURACY else np.nan
+        yield Fix(time_s(times[number], where), as_number(words[0], where), as_number(words[1], where), accuracy)
 
 
 def _names(head: str) -> list[str]:
@@ -340,7 +224,3 @@ def _column(names: Sequence[str], wanted: Sequence[str]) -> int | None:
 
 def _local(tag: Any) -> str:
     return str(tag).rpartition("}")[2]
-
-
-def _hdop_note() -> str:
-    return f"accuracy: {RANGE_ERROR_M:g} m times the dilution of precision (hdop)"

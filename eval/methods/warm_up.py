@@ -18,7 +18,7 @@ from hippodrome.core.refinement.refine import RefineConfig, refine
 from hippodrome.core.types import HippodromeError, Observation, StartPose
 from hippodrome.eval.methods.stages import localize_recording, map_recording
 from hippodrome.sim.drive import simulate_drive
-from hippodrome.sim.ego import EgoSpec
+from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.self_motion import NOISE_LEVELS, sense_self_motion
 from hippodrome.sim.tour import TourSpec
 from hippodrome.sim.town import TownSpec, build_town

@@ -1,12 +1,14 @@
 """Drives on networks that give SUMO freedoms: lanes changed inside junctions, one lane for both ways, no room at the entrance."""
 
+import re
+
 import numpy as np
 import pytest
 
 from hippodrome.sim.drive import simulate_drive
-from hippodrome.sim.ego import EgoSpec
+from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.lane_log import LaneLog, lane_pieces
-from hippodrome.sim.network import read_network
+from hippodrome.sim.network import edge_links, read_network
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.tour import TourSpec
 from hippodrome.sim.town import read_town
@@ -80,7 +82,9 @@ SQUARE = "".join(f'<node id="{name}" x="{x}" y="{y}"/>' for name, x, y in (
 
 
 def test_nobody_meets_the_ego_on_a_lane_for_both_ways(tmp_path):
-    ways = "".join(f'<edge id="{a}{b}" from="{a}" to="{b}" speed="9"/>' for a, b in ("BC", "CB", "CD", "DC", "DA", "AD"))
+    ways = "".join(
+        f'<edge id="{a}{b}" from="{a}" to="{b}" speed="9"/>' for a, b in ("BC", "CB", "CD", "DC", "DA", "AD", "BD", "DB")
+    )
     lane = "".join(f'<edge id="{a}{b}" from="{a}" to="{b}" speed="9" spreadType="center"/>' for a, b in ("AB", "BA"))
     square = town(tmp_path, SQUARE, ways + lane, "--edges.join-tram-dist=-1", "--geometry.remove=false")
     text = square.net_file.read_text()
@@ -93,6 +97,20 @@ def test_nobody_meets_the_ego_on_a_lane_for_both_ways(tmp_path):
         drive = simulate_drive(square, TourSpec(length_m=1500), TrafficSpec(vehicles=8), EgoSpec(), seed)
         assert length_m(drive) == pytest.approx(1500, abs=20)
         assert len(drive.traffic.poses_m) > 0
+    names = [square.network.edge_ids[edge] for edge in np.concatenate(edge_links(square.network)).tolist()]
+    turns = set(zip(names[: len(names) // 2], names[len(names) // 2 :], strict=True))
+    assert ("CB", "BC") in turns and ("AB", "BA") not in turns  # SUMO's ego would wait for itself
+
+
+def test_roads_that_the_network_calls_connectors_are_driven_to_the_end(tmp_path):
+    """SUMO strips them from the ends of a route, and the ego left the road there."""
+    ways = "".join(f'<edge id="{a}{b}" from="{a}" to="{b}" speed="9"/>' for a, b in ("AB", "BC", "CD", "DA"))
+    net_file = town(tmp_path, SQUARE, ways).net_file
+    net_file.write_text(re.sub('<edge id="(AB|CD)"', r'<edge id="\1" function="connector"', net_file.read_text()))
+    square = read_town(net_file)
+    for seed in range(3):
+        drive = simulate_drive(square, TourSpec(length_m=400), TrafficSpec(vehicles=2), EgoSpec(), seed)
+        assert length_m(drive) == pytest.approx(400, abs=15)
 
 
 def test_a_tour_goes_on_where_lanes_are_counted_shorter_than_drawn(tmp_path):

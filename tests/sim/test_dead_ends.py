@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from hippodrome.sim.drive import simulate_drive
-from hippodrome.sim.ego import LENGTH_M, REAR_AXLE_TO_FRONT_M, EgoSpec
+from hippodrome.sim.ego_spec import LENGTH_M, REAR_AXLE_TO_FRONT_M, EgoSpec
 from hippodrome.sim.scene.build import build_scene
 from hippodrome.sim.scene.conditions import Conditions
 from hippodrome.sim.scene.placement import clear_of, paved_area, rectangles, turning_places

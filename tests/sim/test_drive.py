@@ -9,7 +9,7 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import HippodromeError
 from hippodrome.sim.drive import project_m, simulate_drive
-from hippodrome.sim.ego import EgoSpec
+from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.lane_log import LaneLog, driven_edges, lane_pieces, lanes_ahead
 from hippodrome.sim.path import centreline
 from hippodrome.sim.tour import TourSpec

@@ -12,7 +12,7 @@ from hippodrome.eval.authoring.draft import new_scenario
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.driving_side import opendrive_side, osm_side
-from hippodrome.sim.ego import EgoSpec
+from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.keep_left_places import keeps_left_at
 from hippodrome.sim.map_import import sumo_network
 from hippodrome.sim.scene.lanes import Beside, beside, cut_lanes

@@ -8,7 +8,7 @@ import shapely
 
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.sim.drive import drive_pitch_rad, simulate_drive
-from hippodrome.sim.ego import LENGTH_M, REAR_AXLE_TO_FRONT_M, EgoSpec
+from hippodrome.sim.ego_spec import LENGTH_M, REAR_AXLE_TO_FRONT_M, EgoSpec
 from hippodrome.sim.net_heights import pitch_rad
 from hippodrome.sim.render.camera import CameraSpec, camera_position_m, camera_to_world
 from hippodrome.sim.render.renderer import FrameRenderer

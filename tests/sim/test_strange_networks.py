@@ -7,7 +7,7 @@ import pytest
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.sim.drive import simulate_drive
-from hippodrome.sim.ego import EgoSpec
+from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.tour import TourSpec
 from hippodrome.sim.town import TownSpec, build_town
 from hippodrome.sim.traffic import TrafficSpec

@@ -8,6 +8,7 @@ import numpy as np
 from hippodrome._files import sha256_of
 from hippodrome.core import se2
 from hippodrome.core.types import Trajectory
+from hippodrome.eval.cli import main
 from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.proto.codec import save_map
 from hippodrome.sim.episode import Samples
@@ -78,3 +79,8 @@ def _recording(root: Path, role: str, seed: int, network_sha256: str) -> Recordi
     )
     write_chunk(chunk_path(folder, 0), 0, pairs)
     return seal(folder, {"camera": CAMERA.model_dump(mode="json"), "network_sha256": network_sha256}, samples)
+
+
+def imported(source, kind, out, *options):
+    """The exit status of ``hippodrome import``."""
+    return main(["import", str(source), "--from", kind, "--out", str(out), *map(str, options)])

@@ -1,0 +1,69 @@
+"""One fix of satellite navigation, and how the values of its fields are read; ``fixes.py`` reads the files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from hippodrome.eval.metrics.association import TrajectoryError
+
+MAX_FIX_BYTES: Final = 128 << 20  # a day of GPX at 10 Hz
+RANGE_ERROR_M: Final = 4.0  # sigma of a position at a dilution (HDOP) of 1, single-frequency receiver under open sky
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    t_s: float
+    lat_deg: float
+    lon_deg: float
+    sigma_m: float = np.nan
+
+
+def file_bytes(path: Path) -> bytes:
+    try:
+        if (size := path.stat().st_size) > MAX_FIX_BYTES:
+            raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_FIX_BYTES}; cut the track to the drive")
+        return path.read_bytes()
+    except OSError as error:
+        raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def file_text(path: Path, data: bytes) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise TrajectoryError(f"{path}: byte {error.start}: not UTF-8 text; save the file as UTF-8") from None
+
+
+def time_s(text: str, where: str) -> float:
+    """Seconds, of a number, or a date and time (UTC unless it says); milli-, micro- and nanoseconds since 1970 by their size."""
+    text = text.strip()
+    try:
+        value = float(text)
+    except ValueError:
+        try:
+            found = datetime.fromisoformat(text[:26] if len(text) > 26 and text[26:].isdecimal() else text)
+        except (ValueError, OverflowError):
+            raise TrajectoryError(
+                f"{where}: '{text[:40]}' is neither seconds nor a date and time (2026-05-01T12:00:00Z)"
+            ) from None
+        return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp()
+    for above, unit_s in ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)):
+        if abs(value) > above:
+            return value * unit_s
+    return value
+
+
+def as_number(text: Any, where: str) -> float:
+    try:
+        return float(text)
+    except (ValueError, TypeError, OverflowError):
+        raise TrajectoryError(f"{where}: '{str(text)[:40]}' is not a number") from None
+
+
+def hdop_note() -> str:
+    return f"accuracy: {RANGE_ERROR_M:g} m times the dilution of precision (hdop)"

@@ -10,9 +10,9 @@ from hippodrome.core.matching.control import Control
 from hippodrome.core.matching.search.route import Route
 from hippodrome.core.matching.segments import (
     consistent_with_closures,
+    evidence_of,
     route_segments,
     significant_segments,
-    with_evidence,
 )
 from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.types import Edges, FloatArray, MatchBreak, MatchStatus, UInt8Array
@@ -75,9 +75,12 @@ def match_status(
     explained = explained_samples(route, config)
     status = np.where(gap < config.least_gap_nats, MatchStatus.AMBIGUOUS, MatchStatus.MATCHED)
     status[~explained] = MatchStatus.OFF_NETWORK
-    segments = with_evidence(route_segments(route, explained), route, control, config.least_evidence_nats + 1.0)
+    segments = route_segments(route, explained)
+    evidence = evidence_of(segments, route, control, config.least_evidence_nats + 1.0)
     least_samples = min(config.certain_samples, 4 * len(gap) // 5)
-    kept = significant_segments(segments, least_samples, config.least_evidence_nats, config.least_joined_nats, start_known)
+    kept = significant_segments(
+        segments, evidence, least_samples, config.least_evidence_nats, config.least_joined_nats, start_known
+    )
     if closures is not None:
         kept = consistent_with_closures(kept, route, closures, config.distant_m, config.least_votes, config.least_agreeing)
     for segment in segments:

@@ -19,23 +19,25 @@ from typing import TypeAlias
 
 import numpy as np
 
-from hippodrome.core.matching.search.coarse import CoarseStates, coarse_problem
+from hippodrome.core.matching.search.coarse import CoarseStates, coarse_problem, good_states
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.floor import Floor
 from hippodrome.core.matching.search.hypotheses import NOWHERE
 from hippodrome.core.matching.search.passes import best_nats
 from hippodrome.core.matching.search.problem import SearchProblem
 from hippodrome.core.matching.search.route import Route
-from hippodrome.core.matching.search.starts import anchor_samples, starts_without_prior
+from hippodrome.core.matching.search.starts import anchor_samples, from_scratch, starts_from_states
 from hippodrome.core.matching.search.track import Track
 
-Control: TypeAlias = Callable[[int, int, float], float]  # first and end sample, least log likelihood -> ``decoy_nats``
+Control: TypeAlias = Callable[[int, int, float, float], float]  # the last four arguments of ``decoy_nats``, and its answer
 
 FACTOR = 2.0  # chance must cost at least this many times what the route costs: wrong ones cost 0.6 to 1.6 times as much
-_WINDOW = 120  # steps (600 m) around the most turning that are tried first: a right route has proved itself there nearly always
+_WINDOW = 120  # steps (600 m) around the most turning that are tried by themselves: there may be misfits elsewhere
 _MOST_BINS = 25_000  # coarse bins (100 km of lanes) around a part that its decoys may begin in
 _LOG_SCALE = 0.4  # most that the log scale at which a decoy begins differs from that of the part
-_GOOD_STEP_NATS = 0.5  # mean cost of a step up to which a longer part is tried: a right route has 0.1-0.3, chance about 1
+_GOOD_STEP_NATS = (
+    0.5  # mean cost of a step up to which a longer part is tried as a whole: a right route has 0.1-0.3, chance about 1
+)
 _LEAST_TURN_RAD = 0.7  # less turning than half a crossing fits everywhere, to the left as to the right
 
 
@@ -45,26 +47,36 @@ def control_of(problem: SearchProblem, config: RouteSearchConfig, route: Route) 
 
 
 def decoy_nats(
-    problem: SearchProblem,
-    coarse: SearchProblem,
-    config: RouteSearchConfig,
-    route: Route,
-    first: int,
-    end: int,
-    least_nats: float,
-) -> float:
+    problem: SearchProblem, coarse: SearchProblem, config: RouteSearchConfig, route: Route, first: int, end: int,
+    least_nats: float, settled_nats: float,
+) -> float:  # fmt: skip
     """Log likelihood of the best route of a decoy of the samples ``first`` to ``end - 1`` of the drive, from an unknown start.
 
     It is that of the better explained one of two decoys, or -inf if both stay below ``least_nats``; the search ends as soon as
-    that is so.
+    that is so. The second decoy is not searched if the first one reaches ``settled_nats``.
     """
     best, among = NOWHERE, _around(coarse, route, first, end)
     for make_decoy in (mirrored_part, reversed_part):
-        decoy = replace(problem, track=make_decoy(problem.track, first, end))
-        floor = Floor.over(decoy.track, max(best, least_nats))
-        start = starts_without_prior(decoy, coarse, anchor_samples(decoy.track, 1)[0], config, floor, among)
-        best = max(best, best_nats(decoy, start.initial, config, floor))
+        if best < settled_nats:
+            decoy = replace(problem, track=make_decoy(problem.track, first, end))
+            best = max(best, _best_decoy_nats(decoy, coarse, config, Floor.over(decoy.track, max(best, least_nats)), among))
     return best
+
+
+def _best_decoy_nats(
+    decoy: SearchProblem, coarse: SearchProblem, config: RouteSearchConfig, floor: Floor, among: CoarseStates
+) -> float:
+    """Log likelihood of the best route of one decoy from an unknown start, or -inf if it stays below the floor.
+
+    The search begins at an anchor in the first half. Few decoys get over the samples after it, and need not be traced back.
+    """
+    samples = len(decoy.track.arc)
+    anchor = next((t for t in anchor_samples(decoy.track, samples) if t <= samples // 2), 0)
+    hypotheses = good_states(decoy, coarse, anchor, config, floor, among)
+    onward = best_nats(decoy, from_scratch(hypotheses), config, floor, anchor)
+    if anchor == 0 or onward == NOWHERE:
+        return onward
+    return best_nats(decoy, starts_from_states(decoy, anchor, hypotheses, config, floor).initial, config, floor)
 
 
 def _around(coarse: SearchProblem, route: Route, first: int, end: int) -> CoarseStates:
@@ -94,15 +106,17 @@ def evidence_nats(route: Route, first: int, end: int, control: Control, enough_n
     """Evidence that the samples ``first`` to ``end - 1`` of the route were driven: ``FACTOR`` times their log likelihood, less
     that of the decoys.
 
-    It is cut off at ``enough_nats``. The turns around one place are tried first, and the whole part only if they leave it open.
+    It is cut off at ``enough_nats``. The turns around one place are tried if the whole part leaves it open, or is too poor.
     """
     if turned_rad(route.track, first, end) < _LEAST_TURN_RAD:
         return 0.0
     window_first, window_end = _most_turning(route.track, first, end)
-    found = _evidence_within(route, window_first, window_end, control, enough_nats)
     is_good = float(np.mean(route.score_nats[first + 1 : end])) > -_GOOD_STEP_NATS
-    if found < enough_nats and is_good and (window_first, window_end) != (first, end):
-        return _evidence_within(route, first, end, control, enough_nats)
+    if (window_first, window_end) == (first, end) or not is_good:
+        return _evidence_within(route, window_first, window_end, control, enough_nats)
+    found = _evidence_within(route, first, end, control, enough_nats)
+    if found < enough_nats and _is_evident(route, window_first, window_end, control, enough_nats):
+        return enough_nats
     return found
 
 
@@ -112,9 +126,20 @@ def turned_rad(track: Track, first: int, end: int) -> float:
 
 
 def _evidence_within(route: Route, first: int, end: int, control: Control, enough_nats: float) -> float:
-    """``evidence_nats`` of exactly these samples. The step that leads to the first of them does not count."""
-    own = FACTOR * float(np.sum(route.score_nats[first + 1 : end]))
-    return min(own - control(first, end, own - enough_nats), enough_nats)
+    """``evidence_nats`` of exactly these samples. It is not told by how much it is below 0."""
+    own = _own_nats(route, first, end)
+    return min(own - control(first, end, own - enough_nats, own), enough_nats)
+
+
+def _is_evident(route: Route, first: int, end: int, control: Control, enough_nats: float) -> bool:
+    """Whether the evidence of exactly these samples is as much as ``enough_nats``."""
+    own = _own_nats(route, first, end)
+    return control(first, end, own - enough_nats, own - enough_nats) <= own - enough_nats
+
+
+def _own_nats(route: Route, first: int, end: int) -> float:
+    """``FACTOR`` times the log likelihood of these samples of the route. The step that leads to the first does not count."""
+    return FACTOR * float(np.sum(route.score_nats[first + 1 : end]))
 
 
 def _most_turning(track: Track, first: int, end: int) -> tuple[int, int]:

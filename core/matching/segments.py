@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import TypeAlias
 
 import numpy as np
 
@@ -26,6 +29,9 @@ class RouteSegment:
     evidence_nats: float = 0.0  # that the vehicle drove there, against chance
 
 
+Evidence: TypeAlias = Callable[[RouteSegment], float]  # the evidence for a segment, in nats
+
+
 def route_segments(route: Route, explained: BoolArray) -> list[RouteSegment]:
     """Cut the route into segments, still without evidence.
 
@@ -41,17 +47,26 @@ def route_segments(route: Route, explained: BoolArray) -> list[RouteSegment]:
 
 
 def with_evidence(segments: list[RouteSegment], route: Route, control: Control, enough_nats: float) -> list[RouteSegment]:
-    """The segments with the evidence for each, which is cut off at ``enough_nats``.
+    """The segments with the evidence for each, which is cut off at ``enough_nats``."""
+    evidence = evidence_of(segments, route, control, enough_nats)
+    return [replace(segment, evidence_nats=evidence(segment)) for segment in segments]
+
+
+def evidence_of(segments: list[RouteSegment], route: Route, control: Control, enough_nats: float) -> Evidence:
+    """What tells the evidence for one of the segments, cut off at ``enough_nats``. It takes a search, so it is made when asked.
 
     A segment is the best part of a route, chosen after the fact from all of the drive. The more of the drive there was to choose
     from, the more evidence chance finds: ``_CHOICE_NATS`` times ln(length of the drive / length of the segment) is taken off.
+    There is no evidence for segments that turn less than ``_MOST_CONTROLS`` others.
     """
     turned = np.array([turned_rad(route.track, segment.first, segment.end) for segment in segments])
-    tried = set(np.argsort(-turned, kind="stable")[:_MOST_CONTROLS].tolist())
-    return [
-        replace(segment, evidence_nats=_chosen_evidence_nats(segment, route, control, enough_nats)) if i in tried else segment
-        for i, segment in enumerate(segments)
-    ]
+    tried = [segments[i] for i in np.argsort(-turned, kind="stable")[:_MOST_CONTROLS].tolist()]
+
+    @cache
+    def evidence(segment: RouteSegment) -> float:
+        return _chosen_evidence_nats(segment, route, control, enough_nats) if segment in tried else 0.0
+
+    return evidence
 
 
 def _chosen_evidence_nats(segment: RouteSegment, route: Route, control: Control, enough_nats: float) -> float:
@@ -61,8 +76,9 @@ def _chosen_evidence_nats(segment: RouteSegment, route: Route, control: Control,
 
 
 def significant_segments(
-    segments: list[RouteSegment], least_samples: int, least_nats: float, least_joined_nats: float, start_known: bool
-) -> list[RouteSegment]:
+    segments: list[RouteSegment], evidence: Evidence, least_samples: int, least_nats: float, least_joined_nats: float,
+    start_known: bool,
+) -> list[RouteSegment]:  # fmt: skip
     """The segments whose evidence is too high to be due to chance.
 
     Once one segment is certain, dead reckoning ties the others to it, so that less evidence suffices for them. Those that only a
@@ -70,20 +86,33 @@ def significant_segments(
 
     Args:
         segments: all segments of one route, in driving order.
+        evidence: tells the evidence for a segment; it is asked only where the answer decides.
         least_samples: a shorter segment is not certain by itself, whatever the evidence: chance fits a few corners anywhere.
         least_nats: evidence from which on a segment is certain by itself.
         least_joined_nats: evidence that suffices for a segment once another one is certain.
         start_known: whether a start pose was given; the segment at the drive's beginning is certain then.
     """
-    certain = [
-        (s.evidence_nats >= least_nats and s.end - s.first >= least_samples) or (start_known and s.first == 0) for s in segments
-    ]
-    kept = [sure or (any(certain) and s.evidence_nats >= least_joined_nats) for s, sure in zip(segments, certain, strict=True)]
+    longest_first = sorted(range(len(segments)), key=lambda i: segments[i].first - segments[i].end)
+    kept = _joined_briefly([start_known and segment.first == 0 for segment in segments], segments)
+    for i in longest_first:
+        if not kept[i] and segments[i].end - segments[i].first >= least_samples and evidence(segments[i]) >= least_nats:
+            kept[i] = True
+            kept = _joined_briefly(kept, segments)
+    for i in longest_first if any(kept) else ():
+        if not kept[i] and evidence(segments[i]) >= least_joined_nats:
+            kept[i] = True
+            kept = _joined_briefly(kept, segments)
+    return [segment for segment, keep in zip(segments, kept, strict=True) if keep]
+
+
+def _joined_briefly(kept: list[bool], segments: list[RouteSegment]) -> list[bool]:
+    """Which segments are kept together with those that are: their neighbours, as far as only short gaps part them."""
+    joined = list(kept)
     for order in (range(1, len(segments)), range(len(segments) - 2, -1, -1)):
         for i in order:
             neighbour = i - 1 if order.step > 0 else i + 1
-            kept[i] = kept[i] or (kept[neighbour] and _parted_briefly(segments[min(i, neighbour)], segments[max(i, neighbour)]))
-    return [segment for segment, keep in zip(segments, kept, strict=True) if keep]
+            joined[i] |= joined[neighbour] and _parted_briefly(segments[min(i, neighbour)], segments[max(i, neighbour)])
+    return joined
 
 
 def _parted_briefly(before: RouteSegment, after: RouteSegment) -> bool:

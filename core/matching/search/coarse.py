@@ -1,11 +1,13 @@
 """The coarse search for an unknown start: which states may be the right one at a sample of the drive.
 
 It begins in all bins of the network and all scales, with bins and scale bins several times as large as those of the fine search.
-A large network is searched in parts, so that memory does not grow with it; the best route found in one part prunes the others.
+In a large network, places that may be right are found first. It is searched in parts, so that memory does not grow with it; the
+best routes found in one part prune the others.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple, Self
 
@@ -19,10 +21,12 @@ from hippodrome.core.matching.search.model import Drive, SearchModel
 from hippodrome.core.matching.search.passes import forward_pass
 from hippodrome.core.matching.search.problem import InitialHypotheses, SearchProblem, compiled_drive, compiled_model
 from hippodrome.core.roads.lanes_ahead import SearchGraph, build_search_graph
+from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import Float32Array, FloatArray, IntArray
 
-_MOST_STATES = 500_000  # coarse states of one part: 100 km of road
+_MOST_STATES = 400_000  # coarse states of one part: 100 km of lanes
+_NEAR_M = 40.0  # routes that have joined began this close together, as a search begins right before a turn
 _MOST_COARSE = 1_000_000  # hypotheses kept at each step
 _STEPS = 60  # coarse steps (600 m) over which the states of a network in several parts are compared
 _MOST_FINE = 200_000  # fine states that are handed on, the best rated ones
@@ -59,27 +63,76 @@ def good_states(
 def _rated_states(
     coarse: SearchProblem, heading_rad: FloatArray, config: RouteSearchConfig, least_nats: FloatArray, tried: CoarseStates
 ) -> tuple[IntArray, Float32Array]:
-    """Numbers (n,) of the good coarse states, and their ratings (n,).
-
-    What a part of the network scores at each sample prunes the parts after it, as if all were searched at once.
-    """
-    bins_at_once = max(_MOST_STATES // len(tried.scale_bins), 1)
-    parts = range(0, len(tried.bins), bins_at_once)
-    alone = len(parts) == 1
-    samples = len(heading_rad) if alone else min(_STEPS + 1, len(heading_rad))
-    drive, model, least_nats = compiled_drive(coarse, heading_rad[:samples]), compiled_model(coarse), least_nats[:samples].copy()
-    found: list[_Rated] = []
-    for first in parts:
-        initial = hypotheses_in(coarse.graph, tried.bins[first : first + bins_at_once], tried.scale_bins, float(heading_rad[0]))
-        found.append(_rated_part(drive, model, initial, config, least_nats, config.coarse_enough if alone else 0))
-        best = found[-1].best_nats
-        least_nats[: len(best)] = np.maximum(least_nats[: len(best)], best - config.coarse_beam_nats)
-        if len(best) == samples:
-            least_nats[-1] = max(least_nats[-1], best[-1] - config.seed_margin_nats)
+    """Numbers (n,) of the good coarse states, and their ratings (n,)."""
+    whole = len(tried.bins) * len(tried.scale_bins) <= _MOST_STATES and least_nats[-1] == NOWHERE
+    samples = len(heading_rad) if whole else min(_STEPS + 1, len(heading_rad))
+    drive, least_nats = compiled_drive(coarse, heading_rad[:samples]), least_nats[:samples]
+    model, enough = compiled_model(coarse), config.coarse_enough if whole else 0
+    if len(tried.bins) * len(tried.scale_bins) > _MOST_STATES:
+        tried = CoarseStates(_promising_bins(coarse, drive, model, config, tried), tried.scale_bins)
+    found, least_nats = [], least_nats.copy()
+    for initial in _parts(coarse, tried, float(heading_rad[0])):
+        found.append(_rated_part(drive, model, initial, config, least_nats, enough))
+        _raise_floor(least_nats, found[-1].best_nats, config.coarse_beam_nats, config.seed_margin_nats)
     longest = max(len(part.best_nats) for part in found)
     states, nats = (np.concatenate([part[i] for part in found if len(part.best_nats) == longest]) for i in range(2))
     good = nats >= nats.max(initial=NOWHERE) - config.seed_margin_nats
     return states[good], nats[good] - nats.max(initial=NOWHERE)
+
+
+def _parts(coarse: SearchProblem, tried: CoarseStates, heading_rad: float) -> Iterator[Hypotheses]:
+    """The states in which a search begins, in parts that are searched one after the other."""
+    bins_at_once = max(_MOST_STATES // len(tried.scale_bins), 1)
+    for first in range(0, max(len(tried.bins), 1), bins_at_once):
+        yield hypotheses_in(coarse.graph, tried.bins[first : first + bins_at_once], tried.scale_bins, heading_rad)
+
+
+def _raise_floor(least_nats: FloatArray, best_nats: FloatArray, beam_nats: float, margin_nats: float) -> None:
+    """Let what a part of the network scores at each sample prune the others, as if all were searched at once, in place."""
+    own = slice(0, len(best_nats))
+    least_nats[own] = np.maximum(least_nats[own], best_nats - beam_nats)
+    if len(best_nats) == len(least_nats):
+        least_nats[-1] = max(least_nats[-1], best_nats[-1] - margin_nats)
+
+
+def _promising_bins(
+    coarse: SearchProblem, drive: Drive, model: SearchModel, config: RouteSearchConfig, tried: CoarseStates
+) -> IntArray:
+    """The bins, out of a large network, around those from which the best routes lead on, within ``seed_margin_nats``.
+
+    This pass looks for places. To tell states there apart, as ``_rated_part`` does, takes longer. Routes whose ways have joined
+    have begun close together, so that all but the best of them may be forgotten.
+    """
+    least_nats, begun, nats = np.full(len(drive.heading_rad), NOWHERE), [], []
+    for starts in _parts(coarse, tried, float(drive.heading_rad[0])):
+        initial = InitialHypotheses(starts, np.empty(0, PLACE))
+        survivors = forward_pass(drive, model, initial, config.coarse_beam_nats, _MOST_COARSE, least_nats=least_nats)
+        if not survivors.died_out:
+            score, row = survivors.hypotheses["score_nats"], np.arange(*survivors.row_start[-2:])
+            _raise_floor(
+                least_nats, np.maximum.reduceat(score, survivors.row_start[:-1]), config.coarse_beam_nats, config.seed_margin_nats
+            )
+            nats.append(score[row].copy())
+            for _ in range(len(survivors.row_start) - 2):
+                row = survivors.hypotheses["parent"][row]
+            begun.append(starts["bin"][row])
+    if not begun:
+        return tried.bins
+    rating = np.concatenate(nats)
+    places = np.unique(np.concatenate(begun)[rating >= rating.max() - config.seed_margin_nats])
+    return tried.bins[_are_near(coarse.graph.points_m[tried.bins], coarse.graph.points_m[places])]
+
+
+def _are_near(points_m: FloatArray, places_m: FloatArray) -> BoolArray:
+    """Which of the points (N, 2) lie in a square cell with one of the places (P, 2), or in a cell beside it."""
+    low = points_m.min(axis=0)
+    cells, own = (((points - low) / _NEAR_M).astype(np.int64) + 1 for points in (points_m, places_m))
+    marked = np.zeros(cells.max(axis=0) + 2, dtype=bool)
+    for east in (-1, 0, 1):
+        for north in (-1, 0, 1):
+            marked[own[:, 0] + east, own[:, 1] + north] = True
+    near: BoolArray = marked[cells[:, 0], cells[:, 1]]
+    return near
 
 
 class _Rated(NamedTuple):

@@ -50,9 +50,9 @@ class RouteSearchConfig:
     costs: SearchCosts = field(default_factory=SearchCosts)
     off_network: OffNetworkCosts = field(default_factory=OffNetworkCosts)
     coarse: int = 4  # size of the bins and scale bins of the coarse search for an unknown start, in fine ones
-    coarse_beam_nats: float = 15.0  # beam width of the coarse search
+    coarse_beam_nats: float = 12.0  # beam width of the coarse search
     coarse_enough: int = 1_000  # the coarse search stops once no more hypotheses than these are left
-    seed_margin_nats: float = 12.0  # starts at most this far behind the best one are searched finely; a right one is up to 7
+    seed_margin_nats: float = 10.0  # starts at most this far behind the best one are searched finely; a right one is up to 7
     good_start_nats: float = 0.6  # most mean cost of a step after the anchor for a start to be followed; a right one has 0.1-0.4
     anchors: int = 4  # most samples of the drive at which an unknown start is sought, while parts of the drive stay unexplained
     margin_nats: float = 15.0  # alternatives at most this far behind the best route are looked for

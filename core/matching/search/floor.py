@@ -32,6 +32,12 @@ class Floor(NamedTuple):
 
     def from_sample(self, first: int, step: int = 1) -> FloatArray:
         """Least score of a route that begins with 0 at sample ``first``, at this sample and every ``step``-th one after it."""
-        used = self.share[first::step] - self.share[first]
+        return self._least_nats(self.share[first::step] - self.share[first])
+
+    def back_from_sample(self, last: int) -> FloatArray:
+        """Least score of a route back in time that begins with 0 at sample ``last``, at this sample and every one before it."""
+        return self._least_nats(self.share[last] - self.share[last::-1])
+
+    def _least_nats(self, used: FloatArray) -> FloatArray:
         least: FloatArray = np.maximum(self.total_nats * used - _SLACK_NATS, self.total_nats)
         return least

@@ -80,14 +80,16 @@ def most_likely_route(
     return None
 
 
-def best_nats(problem: SearchProblem, initial: InitialHypotheses, config: RouteSearchConfig, floor: Floor | None = None) -> float:
-    """Log likelihood of the most likely route from the initial hypotheses over the whole drive, without the route itself.
+def best_nats(
+    problem: SearchProblem, initial: InitialHypotheses, config: RouteSearchConfig, floor: Floor, first: int = 0
+) -> float:
+    """Log likelihood of the most likely route from hypotheses at sample ``first`` to the end of the drive.
 
     It is ``NOWHERE`` if no route of the network is as long as the drive, or if it stays below the floor; the search ends as soon
     as that is so.
     """
-    least_nats = None if floor is None else floor.from_sample(0)
-    drive, model = compiled_drive(problem, problem.track.heading_rad), compiled_model(problem)
+    drive, model = compiled_drive(problem, problem.track.heading_rad[first:]), compiled_model(problem)
+    least_nats = floor.from_sample(first)
     for section, survivors in _sections(drive, model, initial, config, least_nats):
         if section.last == len(drive.heading_rad) - 1:
             return float(last_survivors(survivors).hypotheses["score_nats"].max()) + section.score_offset_nats

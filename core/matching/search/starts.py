@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hippodrome.core.matching.search.backward import backward
-from hippodrome.core.matching.search.coarse import CoarseStates, good_states, hypotheses_in
+from hippodrome.core.matching.search.coarse import good_states, hypotheses_in
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.floor import Floor
 from hippodrome.core.matching.search.hypotheses import HYPOTHESIS, NOWHERE, PLACE, Hypotheses
@@ -55,28 +55,33 @@ class Start(NamedTuple):
     step_nats: float  # mean log likelihood of a step after the anchor, for the best of the hypotheses there; -inf: there is none
 
 
-def starts_without_prior(
-    problem: SearchProblem, coarse: SearchProblem, anchor: int, config: RouteSearchConfig, floor: Floor | None = None,
-    among: CoarseStates | None = None,
-) -> Start:  # fmt: skip
+def starts_without_prior(problem: SearchProblem, coarse: SearchProblem, anchor: int, config: RouteSearchConfig) -> Start:
     """Find hypotheses for the beginning of the drive without a start pose, by a search that begins at sample ``anchor``.
 
-    The coarse search rates bins and scales at the anchor, a fine one those that it finds good; what both find good is traced back
-    to the beginning of the drive.
-
-    Args:
-        problem: the drive and the network.
-        coarse: what ``coarse_problem`` makes of it.
-        anchor: where to begin.
-        config: bounds of the search.
-        floor: what scores less over the samples after the anchor is dropped.
-        among: the coarse states to begin in; None: all.
+    The coarse search rates all bins and scales at the anchor, a fine one those that it finds good; what both find good is traced
+    back to the beginning of the drive.
     """
-    hypotheses = good_states(problem, coarse, anchor, config, floor, among)
+    return starts_from_states(problem, anchor, good_states(problem, coarse, anchor, config), config)
+
+
+def starts_from_states(
+    problem: SearchProblem, anchor: int, hypotheses: Hypotheses, config: RouteSearchConfig, floor: Floor | None = None
+) -> Start:
+    """As ``starts_without_prior``, from the states at the anchor that the coarse search finds good.
+
+    What stays below the floor over the turns after the anchor is dropped.
+    """
     hypotheses, step_nats = _good_over_horizon(problem, anchor, hypotheses, config, floor)
     if anchor == 0 or len(hypotheses) == 0:
         return Start(InitialHypotheses(hypotheses, _NO_PLACES), step_nats)
-    return Start(_traced_to_beginning(problem, anchor, hypotheses, config), step_nats)
+    return Start(_traced_to_beginning(problem, anchor, hypotheses, config, floor), step_nats)
+
+
+def from_scratch(hypotheses: Hypotheses) -> InitialHypotheses:
+    """The same hypotheses on the network with scores of 0: what their scores are of is still to be searched."""
+    fresh = hypotheses.copy()
+    fresh["score_nats"] = 0.0
+    return InitialHypotheses(fresh, _NO_PLACES)
 
 
 def starts_near_pose(problem: SearchProblem, start: StartPose, config: RouteSearchConfig) -> InitialHypotheses:
@@ -114,10 +119,9 @@ def _good_over_horizon(
     steps = len(drive.heading_rad) - 1
     if steps < 1 or len(hypotheses) == 0:
         return hypotheses, 0.0
-    model, fresh = compiled_model(problem), hypotheses.copy()
-    fresh["score_nats"] = 0.0  # the coarse scores are of the same turns and must not count twice
-    initial = InitialHypotheses(fresh, _NO_PLACES)
-    least_nats = None if floor is None else floor.from_sample(anchor)
+    model, initial = compiled_model(problem), from_scratch(hypotheses)  # the coarse scores are of the same turns
+    fresh = initial.hypotheses
+    least_nats = None if floor is None else floor.from_sample(anchor)[: len(drive.heading_rad)]
     survivors = forward_pass(drive, model, initial, config.beam_nats, config.most_survivors, least_nats=least_nats)
     if survivors.died_out and floor is not None:
         return fresh[:0], NOWHERE
@@ -128,7 +132,7 @@ def _good_over_horizon(
 
 
 def _traced_to_beginning(
-    problem: SearchProblem, anchor: int, hypotheses: Hypotheses, config: RouteSearchConfig
+    problem: SearchProblem, anchor: int, hypotheses: Hypotheses, config: RouteSearchConfig, floor: Floor | None
 ) -> InitialHypotheses:
     """Trace hypotheses at sample ``anchor`` to the beginning of the drive, by a search that runs backwards in time.
 
@@ -139,7 +143,12 @@ def _traced_to_beginning(
     backwards = replace(problem, network=network, graph=graph)
     drive = compiled_drive(backwards, problem.track.heading_rad[anchor::-1] + np.pi)
     initial = InitialHypotheses(_time_reversed(problem.graph, hypotheses), _NO_PLACES)
-    survivors = forward_pass(drive, compiled_model(backwards), initial, config.beam_nats, config.most_survivors)
+    least_nats = None if floor is None else floor.back_from_sample(anchor)
+    survivors = forward_pass(
+        drive, compiled_model(backwards), initial, config.beam_nats, config.most_survivors, least_nats=least_nats
+    )
+    if survivors.died_out and floor is not None:
+        return InitialHypotheses(hypotheses[:0], _NO_PLACES)
     first, places = last_survivors(survivors)
     good = first["score_nats"] >= first["score_nats"].max() - config.seed_margin_nats
     first = _time_reversed(problem.graph, first[good])

@@ -67,7 +67,7 @@ def test_each_status_has_its_reason():
         alternatives=RouteAlternatives(rows, rivals, through.ravel(), np.zeros(2 * steps)),
     )
     status = match_status(
-        route, lambda first, end, least_nats: -1e3, replace(CONFIG, certain_samples=20)
+        route, lambda first, end, least_nats, settled_nats: -1e3, replace(CONFIG, certain_samples=20)
     )  # no mirrored drive fits: evidence enough
     assert set(status[:30]) == {MatchStatus.AMBIGUOUS}
     assert status[35] == MatchStatus.MATCHED

@@ -32,6 +32,10 @@ def route(heading_rad, score_nats, log_scale=None, points_m=None):
     )
 
 
+def known_evidence(segment):
+    return segment.evidence_nats
+
+
 def test_a_segment_is_a_run_of_explained_samples():
     explained = np.isin(np.arange(20), [2, 3, 4, 9, 10])
     assert [(s.first, s.end) for s in route_segments(route(np.zeros(20), np.zeros(20)), explained)] == [(2, 5), (9, 11)]
@@ -41,20 +45,20 @@ def test_a_segment_is_judged_by_its_mirror_image_less_the_choice_of_it():
     corner = np.where(np.arange(40) < 20, 0.0, 0.5 * np.pi)
     asked = []
 
-    def control(first, end, least_nats):
-        asked.append((first, end, least_nats))
+    def control(first, end, least_nats, settled_nats):
+        asked.append((first, end, least_nats, settled_nats))
         return -30.0
 
     drive, whole, half = route(corner, np.full(40, -0.1)), RouteSegment(0, 40), RouteSegment(10, 30)
     (found,) = with_evidence([whole], drive, control, 50.0)
     assert found.evidence_nats == pytest.approx(30.0 - 2.0 * 3.9)  # the step that leads to the first sample does not count
-    assert asked[0] == (0, 40, pytest.approx(-2.0 * 3.9 - 50.0))
+    assert asked[0] == (0, 40, pytest.approx(-2.0 * 3.9 - 50.0), pytest.approx(-2.0 * 3.9))
     (found,) = with_evidence([half], drive, control, 50.0)
     assert found.evidence_nats == pytest.approx(30.0 - 2.0 * 1.9 - 4.0 * np.log(2.0))
 
 
 def test_what_does_not_turn_is_no_evidence_and_is_not_searched():
-    def control(first, end, least_nats):
+    def control(first, end, least_nats, settled_nats):
         raise AssertionError("searched")
 
     assert with_evidence([RouteSegment(0, 40)], route(np.zeros(40), np.zeros(40)), control, 8.0)[0].evidence_nats == 0.0
@@ -62,8 +66,10 @@ def test_what_does_not_turn_is_no_evidence_and_is_not_searched():
 
 def test_short_gaps_carry_certainty_on_and_jumps_of_the_scale_do_not():
     found = [RouteSegment(0, 5), RouteSegment(9, 20), RouteSegment(20, 30), RouteSegment(60, 90, 40.0), RouteSegment(95, 99)]
-    assert significant_segments(found, 10, 8.0, 3.0, start_known=False) == found[3:]  # 30 samples are too long a gap
-    assert significant_segments(found, 10, 8.0, 3.0, start_known=True) == [*found[:2], *found[3:]]
+    assert (
+        significant_segments(found, known_evidence, 10, 8.0, 3.0, start_known=False) == found[3:]
+    )  # 30 samples are too long a gap
+    assert significant_segments(found, known_evidence, 10, 8.0, 3.0, start_known=True) == [*found[:2], *found[3:]]
 
 
 def test_a_jump_of_the_scale_begins_another_segment():
@@ -73,15 +79,30 @@ def test_a_jump_of_the_scale_begins_another_segment():
 
 def test_one_certain_segment_carries_the_others():
     found = [RouteSegment(0, 5, 3.0), RouteSegment(19, 30, 8.0), RouteSegment(50, 90, 40.0)]
-    assert significant_segments(found, 10, 24.0, 6.0, start_known=False) == found[1:]
-    assert significant_segments(found[:2], 10, 24.0, 6.0, start_known=False) == []
-    assert significant_segments(found[:2], 10, 24.0, 6.0, start_known=True) == found[:2]
+    assert significant_segments(found, known_evidence, 10, 24.0, 6.0, start_known=False) == found[1:]
+    assert significant_segments(found[:2], known_evidence, 10, 24.0, 6.0, start_known=False) == []
+    assert significant_segments(found[:2], known_evidence, 10, 24.0, 6.0, start_known=True) == found[:2]
 
 
 def test_a_short_segment_is_never_certain_by_itself():
     found = [RouteSegment(0, 5, 40.0), RouteSegment(20, 60, 2.0)]
-    assert significant_segments(found, 10, 8.0, 3.0, start_known=False) == []
-    assert significant_segments(found, 5, 8.0, 3.0, start_known=False) == found[:1]
+    assert significant_segments(found, known_evidence, 10, 8.0, 3.0, start_known=False) == []
+    assert significant_segments(found, known_evidence, 5, 8.0, 3.0, start_known=False) == found[:1]
+
+
+def test_only_what_decides_is_asked_for():
+    asked = []
+
+    def evidence(segment):
+        asked.append(segment)
+        return segment.evidence_nats
+
+    found = [RouteSegment(0, 5, 2.0), RouteSegment(30, 90, 40.0), RouteSegment(95, 160, 40.0)]
+    assert significant_segments(found, evidence, 10, 8.0, 3.0, start_known=False) == found[1:]
+    assert asked == [found[2], found[0]]  # the one between is parted from the last by 25 m only
+    asked.clear()
+    assert significant_segments(found[:1], evidence, 10, 8.0, 3.0, start_known=False) == []
+    assert asked == []  # too short to be certain, and no other one is
 
 
 def test_loop_closures_vote_down_the_segment_that_is_elsewhere():

@@ -23,7 +23,7 @@ from hippodrome.sim.renamed import present_value
 Leaf: TypeAlias = "NDArray[Any] | str | int | float | bool | None"
 Reader: TypeAlias = Callable[[Path], Iterator[tuple[str, Leaf]]]
 
-PROVENANCE: Final = frozenset({"configuration", "provenance", "versions", "code_sha256", "sha256"})
+PROVENANCE: Final = frozenset({"configuration", "provenance", "versions", "code_sha256", "sha256", "manifest_sha256"})
 FILE_SIZES: Final = frozenset({"map_bytes", "bytes_per_view"})  # a map's file also holds its provenance: its arrays are compared
 RECORDING_KEY: Final = re.compile(r"-[0-9a-f]{16}$")  # ends a recording's name and depends on the code that made it
 LEFT_OUT: Final = TIMING_FIELDS | PROVENANCE | FILE_SIZES | {"cpu_s", "rerun"}  # rerun: the command to type

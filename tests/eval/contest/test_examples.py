@@ -68,6 +68,7 @@ def test_the_client_of_the_stream_on_a_real_drive(row):
 
 NOT_RUN = {
     "svo",
+    "svo-requirements",
     "dbow",
 }  # need packages that are no dependencies of ours; docs/methods.md has their results
 

@@ -44,6 +44,15 @@ def test_what_a_drive_has_is_enough():
     require_met(Needs(camera=False), scenario(), BARE)
 
 
+@pytest.mark.parametrize(
+    ("fields", "cause"),
+    [({"size_px": "640x480"}, "width and height in pixels"), ({"stereo": True, "camera": False}, "camera=False asks for none")],
+)
+def test_needs_that_no_drive_can_meet_are_refused(fields, cause):
+    with pytest.raises(ValueError, match=cause):
+        Needs(**fields)
+
+
 def test_the_unit_of_the_speeds_is_known_where_it_was_said():
     told = SimpleNamespace(manifest={"imported": {}, "metres_per_unit": 0.5})
     assert metres_per_unit(scenario(), told) == 0.5

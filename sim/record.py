@@ -111,6 +111,10 @@ def prepare(plan: RecordingPlan) -> list[int]:
     folder = plan.folder()
     if (folder / MANIFEST).exists():
         return []
+    if plan.drive_spec.recording is not None:
+        raise RecordingError(
+            f"{folder}: the scenario's {plan.role}.recording is no finished recording; `hippodrome import` makes one"
+        )
     for abandoned in folder.glob(".*.part"):
         abandoned.unlink()
     if not (folder / "samples.npz").exists():

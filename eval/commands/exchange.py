@@ -1,4 +1,4 @@
-"""``hippodrome export``, ``import`` and ``score``: to and from other people's tools and drives."""
+"""``hippodrome export`` and ``import``: to and from other people's tools and drives; ``score.py`` adds ``score`` to them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_units
+from hippodrome.eval.commands.arguments import DONE, add_command, add_units
+from hippodrome.eval.commands.foreign import add_truth, ahead, offset, rate, size
+from hippodrome.eval.commands.score import add_score_command
 
 EXPORTS = ("tum", "kitti", "euroc", "mcap", "rerun", "evo", "rosbag2", "gpx", "geojson")
 IMPORTS = ("images", "video", "odometry", "kitti", "kitti-raw", "tum", "euroc", "donkeycar", "mcap", "rosbag")
@@ -63,7 +65,7 @@ def add_exchange_commands(commands: Any) -> None:
     add_drive_options(into)
     add_units(into, "unknown; `hippodrome refine` may be told later")
     into.add_argument("--out", type=Path, required=True, metavar="RECORDING", help="a new folder; one that exists is not touched")
-    _add_score(commands)
+    add_score_command(commands)
 
 
 def add_drive_options(into: argparse.ArgumentParser) -> None:
@@ -73,7 +75,7 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
         help="the layout of the source (default: recognised by what lies in it)",
     )  # fmt: skip
     into.add_argument(
-        "--fps", type=_rate, metavar="N",
+        "--fps", type=rate, metavar="N",
         help="frames a second, for a folder of images, a video without time stamps, or poses without times (default: the "
              "source's own times)",
     )  # fmt: skip
@@ -89,7 +91,7 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
         help="unit of the times in the file of self-motion (default: its header's, or recognised by size and interval)",
     )
     into.add_argument(
-        "--time-offset", type=_offset, default=0.0, metavar="S", dest="time_offset_s",
+        "--time-offset", type=offset, default=0.0, metavar="S", dest="time_offset_s",
         help="seconds to add to the times of the self-motion, to lay its clock on that of the frames; auto: told by the turns "
              "that the truth, if it has headings, or else the frames show; refused where that is not sure (default: 0)",
     )  # fmt: skip
@@ -105,22 +107,22 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
              "the distortion that it describes (default: the layout's focal length, if any)",
     )  # fmt: skip
     into.add_argument(
-        "--camera-height", type=_rate, default=1.5, metavar="M", dest="camera_height_m",
+        "--camera-height", type=rate, default=1.5, metavar="M", dest="camera_height_m",
         help="metres of the camera above the road, for --odometry visual: its speeds are as wrong as this (default: 1.5)",
     )  # fmt: skip
     into.add_argument(
-        "--camera-ahead", type=_ahead, default="auto", metavar="N",
+        "--camera-ahead", type=ahead, default="auto", metavar="N",
         help="how far ahead of the rear axle the camera sits whose poses are differentiated or are the truth, in the unit of the "
              "poses; they are moved to the axle. auto estimates it from how they slip sideways in turns, and takes 0 where that "
              "does not tell (default: auto)",
     )  # fmt: skip
     into.add_argument(
-        "--truth-ahead", type=_ahead, metavar="N",
+        "--truth-ahead", type=ahead, metavar="N",
         help="the same for the poses of the truth, where it is another point's (default: as --camera-ahead)",
     )  # fmt: skip
-    _add_truth(into, "the layout's own, if any")
+    add_truth(into, "the layout's own, if any")
     into.add_argument(
-        "--truth-offset", type=_offset, default=0.0, metavar="S", dest="truth_offset_s",
+        "--truth-offset", type=offset, default=0.0, metavar="S", dest="truth_offset_s",
         help="seconds to add to the times of the truth, to lay its clock on the drive's (a video begins at 0, a GPX file has the "
              "date); auto: told by the turns of both; refused where that is not sure (default: 0)",
     )  # fmt: skip
@@ -133,150 +135,7 @@ def add_drive_options(into: argparse.ArgumentParser) -> None:
         help="network: the truth is in the road network's frame, so that a topometric map is scored as it lies; own: it is "
              "aligned first (default: own)",
     )  # fmt: skip
-    into.add_argument("--size", type=_size, metavar="WxH", help="scale frames to this size in pixels (default: as they are)")
-
-
-def _add_score(commands: Any) -> None:
-    score = add_command(
-        commands, "score", _score, "score a map or a trajectory against a recording's truth",
-        """Print the absolute and relative errors (APE, RPE; metres) of a map or a trajectory, each with its definition.
-
-        The recording may be one of ours or an imported one that came with its truth; or the truth is a file of its own, poses or
-        fixes in latitude and longitude. Truth that comes more seldom than four times a second is scored at its own times. Poses
-        in space are turned level before height, roll and pitch are dropped. Exit status 1: a limit was missed.""",
-        ["hippodrome score out/grid/topo.pbstream out/grid/recordings/grid-mapping-*",
-         "hippodrome score visual-odometry.tum recordings/kitti-07 --own-frame",
-         "hippodrome score localized.tum out/grid/recordings/grid-localization-* --localization",
-         "hippodrome score topo.pbstream recordings/monday --truth phone.gpx --network town.net.xml --max-ape 5"],
-    )  # fmt: skip
-    score.add_argument(
-        "estimate", type=Path, metavar="MAP.pbstream|TRAJECTORY.tum",
-        help="what is scored: a map, a TUM trajectory, or KITTI's 12 columns with --times",
-    )  # fmt: skip
-    score.add_argument("recording", type=Path, metavar="RECORDING", help="the recording whose truth it is held against")
-    score.add_argument(
-        "--own-frame", action="store_true",
-        help="the trajectory has a frame and a scale of its own: align it in several ways and print the errors of each",
-    )  # fmt: skip
-    score.add_argument(
-        "--localization", action="store_true",
-        help="the trajectory is a localizer's of a second drive, in the road network's frame: print whether and when it was "
-             "localized, its error from then on, and its false fixes; a ninth column, 1 or 0, says which poses it stands by "
-             "(default: a mapper's trajectory; without the column: it stands by all)",
-    )  # fmt: skip
-    score.add_argument(
-        "--axes", choices=["body", "camera"],
-        help="which way poses point: body: x forward, z up; camera: z forward, y down (default: body; for 12 columns, camera)",
-    )  # fmt: skip
-    score.add_argument(
-        "--times", type=Path, metavar="FILE", help="seconds, a line for each of KITTI's poses (default: none; KITTI's need it)"
-    )
-    score.add_argument(
-        "--clock", choices=["auto", "source", "recording"], default="auto",
-        help="the clock of the trajectory: source: that of the drive as it was imported; recording: 0 at the recording's start; "
-             "auto: recording for files that hippodrome wrote, source for others (default: auto)",
-    )  # fmt: skip
-    score.add_argument(
-        "--camera-ahead", type=_metres_ahead, metavar="M",
-        help="how far ahead of the rear axle the camera sits whose trajectory this is; it is then held against the axle's truth "
-             "(default: it is that of the point whose truth was measured)",
-    )  # fmt: skip
-    score.add_argument(
-        "--truth-ahead", type=_ahead, default="auto", metavar="M",
-        help="how far ahead of the rear axle the point lies whose poses --truth has; auto estimates it from how they slip "
-             "sideways in turns (default: auto)",
-    )  # fmt: skip
-    _add_truth(score, "the recording's own")
-    score.add_argument(
-        "--time-offset", type=float, default=0.0, metavar="S", help="seconds to add to the times of --truth (default: 0)"
-    )
-    score.add_argument(
-        "--max-gap", type=_above_zero, metavar="S",
-        help="do not interpolate between samples farther apart than this, in seconds (default: 0.25; at sparse truth 1, or "
-             "twice the estimate's usual interval)",
-    )  # fmt: skip
-    score.add_argument("--json", type=Path, metavar="FILE", help="also write the figures into this file (default: none)")
-    score.add_argument(
-        "--max-ape",
-        type=_above_zero,
-        metavar="M",
-        help="exit status 1 if the mean of the first APE is larger (default: no limit)",
-    )
-    score.add_argument(
-        "--max-rpe", type=_above_zero, metavar="M", help="exit status 1 if the mean RPE over 20 m is larger (default: no limit)"
-    )
-
-
-def _add_truth(parser: argparse.ArgumentParser, default: str) -> None:
-    """The truth as a file, its projection and its accuracy."""
-    parser.add_argument(
-        "--truth", type=Path, metavar="FILE",
-        help="true poses (.tum), or fixes: GPX, CSV with the columns t_s, lat, lon, NMEA, GeoJSON, the folder of OXTS data "
-             f"(default: {default})",
-    )  # fmt: skip
-    parser.add_argument(
-        "--network", type=Path, metavar="NET.net.xml[.gz]",
-        help="the road network into whose frame fixes are projected, so that a topometric map is scored as it lies (default: a "
-             "plane of their own)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--truth-sigma", type=_above_zero, metavar="M",
-        help="accuracy of the truth: standard deviation along one axis, metres (default: as the file says)",
-    )  # fmt: skip
-
-
-def _above_zero(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
-    return value
-
-
-def _offset(text: str) -> float | str:
-    if text == "auto":
-        return text
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not abs(value) <= 1e11:
-        raise argparse.ArgumentTypeError(f"'{text}' is neither auto nor a number of seconds")
-    return value
-
-
-def _ahead(text: str) -> float | str:
-    return text if text == "auto" else _metres_ahead(text, "auto or ")
-
-
-def _metres_ahead(text: str, or_else: str = "") -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not abs(value) <= 1e4:
-        raise argparse.ArgumentTypeError(f"'{text}' is not {or_else}a number from -10000 to 10000")
-    return value
-
-
-def _rate(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.01 <= value <= 10_000.0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0.01 to 10000")
-    return value
-
-
-def _size(text: str) -> tuple[int, int]:
-    width, x, height = text.partition("x")
-    try:
-        size = int(width), int(height)
-    except ValueError:
-        size = (0, 0)
-    if not x or not all(16 <= side <= 8192 for side in size):
-        raise argparse.ArgumentTypeError(f"'{text}' is not WxH in pixels, 16 to 8192 each")
-    return size
+    into.add_argument("--size", type=size, metavar="WxH", help="scale frames to this size in pixels (default: as they are)")
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -301,16 +160,3 @@ def import_command(options: argparse.Namespace) -> int:
         )
     )  # fmt: skip
     return DONE
-
-
-def _score(options: argparse.Namespace) -> int:
-    from hippodrome.eval.exchange.score import ScoreOptions, score_files
-
-    held = score_files(
-        ScoreOptions(
-            options.estimate, options.recording, not options.own_frame, options.axes, options.times, options.clock, options.truth,
-            options.network, options.truth_sigma, options.time_offset, options.max_gap, options.json, options.max_ape,
-            options.max_rpe, options.camera_ahead, options.truth_ahead, options.localization,
-        )
-    )  # fmt: skip
-    return DONE if held else THRESHOLD_FAILED

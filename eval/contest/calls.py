@@ -161,6 +161,8 @@ def _draw(entry: Entry, materials: Materials, drawn: Mapping[str, Drawn | str], 
     cpu_s = process_time() - began - feed.decoding_s
     feed.settle()
     peak_rss_bytes = growth.as_if_alone_bytes() if mapped.cost is None else mapped.cost.peak_rss_bytes
+    if mapped.cost is None and base is not None and peak_rss_bytes is not None:
+        peak_rss_bytes = max(peak_rss_bytes, base.peak_rss_bytes or 0)
     check_trajectory(mapped.trajectory, label)
     map_bytes = guarded(label, lambda: _save(entry, mapped, materials), materials)
     step_s = feed.step_s

@@ -14,15 +14,16 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from hippodrome.core.localization.localizer import Localizer
-from hippodrome.core.mapping.mapper import Mapper
-from hippodrome.core.refinement.refine import refine
+import numpy as np
+
+from hippodrome.core.mapping.mapper import Mapper, MapperConfig
+from hippodrome.core.types import Observation
 
 FORGET: Final = Path("/proc/self/clear_refs")
 FORGET_PEAK: Final = "5"  # what is written there, see proc(5)
 STATUS: Final = Path("/proc/self/status")
-LIBRARIES: Final = (Mapper.__module__, refine.__module__, Localizer.__module__)
-ALONE: Final = f"import {', '.join(LIBRARIES)}; print(open('/proc/self/status').read())"
+ALONE: Final = (sys.executable, "-m", "hippodrome.eval.methods.memory")
+FRAMES: Final = 20  # of noise, that make the mapper load its compiled functions
 
 
 class Growth:
@@ -43,9 +44,9 @@ class Growth:
 
 @cache
 def held_by_libraries() -> int | None:
-    """What a process holds that has loaded the libraries of our methods and done nothing yet; found once by starting one."""
+    """What a process holds that has loaded the libraries of our methods, and done next to nothing; found once by starting one."""
     try:
-        done = subprocess.run([sys.executable, "-c", ALONE], capture_output=True, text=True, timeout=60.0, check=False)
+        done = subprocess.run(ALONE, capture_output=True, text=True, timeout=60.0, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return None
     return _figure_of(done.stdout, "VmHWM")
@@ -71,3 +72,16 @@ def _figure_of(status: str, name: str) -> int | None:
     """A figure of the text of a process's status; None if it has none."""
     _, found, rest = status.partition(f"{name}:")
     return 1024 * int(rest.split()[0]) if found else None
+
+
+def main() -> None:
+    """Load what a mapper loads, with a few frames of noise, and print the status of this process."""
+    mapper, rng = Mapper(MapperConfig()), np.random.default_rng(0)
+    for i in range(FRAMES):
+        mapper.step(Observation(0.1 * (i + 1), 0.1, 5.0, 0.1, rng.integers(0, 256, (120, 160, 3), dtype=np.uint8)))
+    mapper.finish()
+    print(STATUS.read_text())
+
+
+if __name__ == "__main__":
+    main()

@@ -51,6 +51,16 @@ class Needs:
     metric_scale: bool = False  # how many metres a unit of the self-motion has, as ``Given.metres_per_unit``
     frames_optional: bool = False  # it does with self-motion alone where a drive has no frames
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for what no drive can give."""
+        size_px: object = self.size_px
+        if size_px is not None and not (
+            isinstance(size_px, tuple) and len(size_px) == 2 and all(isinstance(side, int) and side > 0 for side in size_px)
+        ):
+            raise ValueError(f"Needs: size_px is {size_px!r}; width and height in pixels are expected, as (640, 480)")
+        if not self.camera and (self.stereo or self.grain or size_px is not None):
+            raise ValueError("Needs: stereo, size_px and grain are of frames, and camera=False asks for none")
+
     def in_words(self) -> str:
         """What the report says: ``self-motion, frames of one camera, the road network``."""
         frames = "stereo pairs" if self.stereo else "frames of one camera"

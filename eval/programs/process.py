@@ -23,6 +23,7 @@ from hippodrome.sim.method_spec import MethodSpec
 
 MEGABYTE: Final = 1_000_000
 POLL_S: Final = 0.05  # between two looks at a process: its memory is looked at as well
+FIRST_POLL_S: Final = 0.001  # between the first ones: what ends at once has its memory looked at, too
 FILE_BYTES: Final = 4 << 30  # the longest file that a program may write, its printed text included
 LAST_WORDS: Final = 300  # characters of what a program printed last that an error quotes
 LEAST_WORK: Final = 0.02  # share of a core: a program that uses less of one for longer than its limit has stalled
@@ -129,8 +130,10 @@ class Process:
 
     def wait(self) -> None:
         """Until it ends by itself or is past a limit. Raises ProgramEnded unless it ended well."""
+        pause_s = FIRST_POLL_S
         while not self.poll():
-            time.sleep(POLL_S)
+            time.sleep(pause_s)
+            pause_s = min(2.0 * pause_s, POLL_S)
         if (cause := self.failure()) is not None:
             raise self.error(cause)
 

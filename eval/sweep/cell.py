@@ -122,16 +122,14 @@ def _locked(plan: RecordingPlan) -> Iterator[None]:
 
 def _samples(row: Row, evidence: Path) -> dict[str, Samples]:
     """The errors behind a row's figures, scored again from the trajectories that the evaluation left."""
-    method = method_of(row.method, row.declaration.frame if row.declaration else None)
+    method, found = method_of(row.method, row.declaration.frame if row.declaration else None), {}
     path = evidence / f"{method.stem}.tum"
-    if row.ape is None or not path.exists():
-        return {}
-    truth = read_tum(evidence / "ground-truth.tum")
-    scored = score_trajectory(read_tum(path), truth, method.alignment)
-    found = {name: _kept(score) for name, score in (("ape", scored.ape), ("rpe", scored.rpe), ("rpe_20m", scored.rpe_20m))}
-    path = evidence / f"{method.stem}-localization.tum"
-    if row.localization is not None and path.exists():
-        located = _localization(read_tum(path), read_tum(evidence / "localization-ground-truth.tum"), row.localization.definition)
+    if row.ape is not None and path.exists():
+        scored = score_trajectory(read_tum(path), read_tum(evidence / "ground-truth.tum"), method.alignment)
+        found = {name: _kept(score) for name, score in (("ape", scored.ape), ("rpe", scored.rpe), ("rpe_20m", scored.rpe_20m))}
+    path, truth_path = evidence / f"{method.stem}-localization.tum", evidence / "localization-ground-truth.tum"
+    if row.localization is not None and path.exists() and truth_path.exists():  # a drive of others may have no truth
+        located = _localization(read_tum(path), read_tum(truth_path), row.localization.definition)
         found |= {"localization": located} if located is not None else {}
     return found
 

@@ -17,7 +17,7 @@ import dbow
 import numpy as np
 from pydantic import BaseModel
 
-from hippodrome.sim.recording import open_recording
+from examples.methods.learning import frames_to_learn_on
 
 
 class BagOfBinaryWords:
@@ -33,7 +33,7 @@ class BagOfBinaryWords:
 
     def __init__(self, config):
         np.random.seed(1)  # noqa: NPY002 - pydbow draws its first clusters with it
-        views = [view for folder in config.learn_on for view in self.some_frames(open_recording(folder), config.frames)]
+        views = frames_to_learn_on(config.learn_on, config.frames)
         seen = [view for view in views if cv2.ORB_create().detect(view)]
         self.vocabulary = dbow.Vocabulary(seen, config.branching, config.depth)
 
@@ -44,9 +44,3 @@ class BagOfBinaryWords:
             return np.zeros(len(self.vocabulary.words))
         bag = self.vocabulary.descs_to_bow([dbow.ORB.from_cv_descriptor(one) for one in found]).data
         return bag / max(np.linalg.norm(bag), 1e-9)
-
-    @staticmethod
-    def some_frames(recording, count):
-        """Frames spread evenly over a drive."""
-        numbers = np.unique(np.linspace(0, recording.frame_count - 1, count).astype(int))
-        return [recording.frame(int(number)) for number in numbers]

@@ -1,7 +1,13 @@
 """SVO, the semi-direct visual odometry of Forster et al. (2014), as a program: the package svo-cpp in an environment of its own.
 
-python3 -m venv svo && svo/bin/pip install svo-cpp
-hippodrome eval my-town.yaml --method "SVO=exec:svo/bin/python examples/methods/svo.py {sequence} {out}"
+hippodrome eval my-town.yaml --out out/svo      # with this in my-town.yaml:
+
+    camera: {width: 640, height: 480, grain: true}
+    methods:
+      SVO:
+        command: "{python} examples/methods/svo.py {sequence} {out}"
+        environment: examples/methods/svo-requirements.txt
+        needs: [640x480, grain]
 
 One camera has no scale, and SVO begins anew where it loses its way. So each stretch that it tracks gets the length that the
 wheels say, and between two stretches the wheels and the gyro lead on. It wants frames of 640x480 at 10 Hz, with grain.

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from pydantic import BaseModel
 
-from hippodrome.sim.recording import open_recording
+from examples.methods.learning import frames_to_learn_on
 
 
 class Vlad:
@@ -30,7 +30,7 @@ class Vlad:
 
     def __init__(self, config):
         self.sift = cv2.SIFT_create(200)
-        views = [view for folder in config.learn_on for view in self.some_frames(open_recording(folder), config.frames)]
+        views = frames_to_learn_on(config.learn_on, config.frames)
         found = np.concatenate([self.local(view) for view in views])
         cv2.setRNGSeed(1)
         criteria = (cv2.TERM_CRITERIA_MAX_ITER, 30, 0.0)
@@ -51,9 +51,3 @@ class Vlad:
         if found is None:
             return np.zeros((1, 128), np.float32)
         return np.sqrt(found / np.maximum(found.sum(axis=1, keepdims=True), 1e-9))
-
-    @staticmethod
-    def some_frames(recording, count):
-        """Frames spread evenly over a drive."""
-        numbers = np.unique(np.linspace(0, recording.frame_count - 1, count).astype(int))
-        return [recording.frame(int(number)) for number in numbers]

@@ -20,12 +20,19 @@ class Drive:
         t_s = STEP_S * (1 + np.arange(STEPS))
         turn = SPEED_MPS / RADIUS_M * t_s
         poses = np.column_stack([RADIUS_M * np.sin(turn), RADIUS_M * (1.0 - np.cos(turn)), se2.wrap(turn)])
-        self.samples = SimpleNamespace(t_s=t_s, poses_m=poses)
+        number = np.where(np.arange(STEPS) % 2 == 0, np.arange(STEPS) // 2, -1)
+        self.samples = SimpleNamespace(t_s=t_s, poses_m=poses, frame=number, observation=self.step)
+        self.manifest = {}
+
+    def step(self, i, frame):
+        return Observation(float(self.samples.t_s[i]), STEP_S, SPEED_MPS, SPEED_MPS / RADIUS_M, frame)
+
+    def frame(self, number, side=""):
+        return np.full((12, 16, 3), (2 * number + bool(side)) % 256, np.uint8)  # the right image is brighter by one
 
     def observations(self):
-        for i, t_s in enumerate(self.samples.t_s):
-            frame = np.full((12, 16, 3), i % 256, np.uint8) if i % 2 == 0 else None
-            yield Observation(float(t_s), STEP_S, SPEED_MPS, SPEED_MPS / RADIUS_M, frame)
+        for i, number in enumerate(self.samples.frame):
+            yield self.step(i, self.frame(number) if number >= 0 else None)
 
     def self_motion(self):
         return (Observation(o.t_s, o.dt_s, o.speed, o.yaw_rate_radps) for o in self.observations())

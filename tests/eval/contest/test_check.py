@@ -6,20 +6,12 @@ from hippodrome.eval.cli import main
 from hippodrome.eval.contest.check import findings, list_lines
 from hippodrome.eval.contest.entry import BUILT_IN, entries_of, parse_method, with_methods
 from hippodrome.eval.contest.perform import perform
+from tests.eval.contest.entrants import MAPPER
 
-MODULE = """\
-import math, os
+MODULE = f"""\
+import os
 from hippodrome.eval.methods.protocol import Answer
-
-class Mapper:
-    def map(self, observations, given):
-        x = y = heading = 0.0
-        for one in observations:
-            heading += one.yaw_rate_radps * one.dt_s
-            x += one.speed * one.dt_s * math.cos(heading)
-            y += one.speed * one.dt_s * math.sin(heading)
-            yield one.t_s, x, y, heading
-
+{MAPPER}
 class Moved(Mapper):
     frame = "network"
     def map(self, observations, given):

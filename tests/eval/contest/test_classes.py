@@ -10,22 +10,13 @@ from hippodrome.eval.contest.entry import BUILT_IN, entries_of, parse_method, wi
 from hippodrome.eval.contest.loading import load_class, made_of
 from hippodrome.eval.contest.perform import perform
 from hippodrome.sim.scenario import Scenario
+from tests.eval.contest.entrants import MAPPER
 
-MODULE = """\
-import math
+MODULE = f"""\
 import numpy as np
 from pydantic import BaseModel
 from hippodrome.eval.methods.protocol import Answer, Needs
-
-class Mapper:
-    def map(self, observations, given):
-        x = y = heading = 0.0
-        for one in observations:
-            heading += one.yaw_rate_radps * one.dt_s
-            x += one.speed * one.dt_s * math.cos(heading)
-            y += one.speed * one.dt_s * math.sin(heading)
-            yield one.t_s, x, y, heading
-
+{MAPPER}
 class Configured(Mapper):
     class Config(BaseModel):
         factor: float = 1.0

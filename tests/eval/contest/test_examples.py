@@ -14,6 +14,7 @@ from hippodrome.sim.scenario import load_scenario
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples/methods"
 RUN_ELSEWHERE = {"stream_client.py", "stream_client.cpp"}  # tests/eval/contest/test_streams.py
+PART_OF_OTHERS = {"learning.py"}  # of vlad.py and dbow.py
 
 
 @pytest.fixture
@@ -67,6 +68,7 @@ def test_the_client_of_the_stream_on_a_real_drive(row):
 
 NOT_RUN = {
     "svo",
+    "svo-requirements",
     "dbow",
 }  # need packages that are no dependencies of ours; docs/methods.md has their results
 

@@ -11,21 +11,10 @@ import pytest
 from hippodrome.eval.contest.entry import Added, entries_of, parse_method, with_methods
 from hippodrome.eval.contest.perform import perform
 from hippodrome.sim.method_spec import MethodSpec
+from tests.eval.contest.entrants import MAPPER
 
 EXAMPLES = Path(__file__).parents[3] / "examples/methods"
 LONGEST = 100  # lines of a client
-CLASS = """\
-import math
-
-class Mapper:
-    def map(self, observations, given):
-        x = y = heading = 0.0
-        for one in observations:
-            heading += one.yaw_rate_radps * one.dt_s
-            x += one.speed * one.dt_s * math.cos(heading)
-            y += one.speed * one.dt_s * math.sin(heading)
-            yield one.t_s, x, y, heading
-"""
 FRAMES = """\
 import sys, zlib
 from google.protobuf.proto import parse_length_prefixed, serialize_length_prefixed
@@ -103,7 +92,7 @@ def test_clients_are_short():
 
 
 def test_a_streamed_method_gives_the_bytes_that_it_gives_in_process(materials, cpp, tmp_path, monkeypatch):
-    (tmp_path / "streamed_twin.py").write_text(CLASS)
+    (tmp_path / "streamed_twin.py").write_text(MAPPER)
     monkeypatch.chdir(tmp_path)
     python = Added("python", MethodSpec(stream=f"{sys.executable} {EXAMPLES / 'stream_client.py'}"))
     added = (parse_method("class=streamed_twin:Mapper"), python, Added("cpp", MethodSpec(stream=cpp)))

@@ -8,13 +8,12 @@ from typing import Final
 
 import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
-from pydantic import Field
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from hippodrome.core.types import FloatArray
+from hippodrome.sim.ego_spec import EgoSpec as EgoSpec  # it belongs to the vehicle, and is found here, too
 from hippodrome.sim.path import STEP_M, Path
-from hippodrome.sim.spec import Spec
 
 WHEELBASE_M: Final = 2.7  # a compact car
 LENGTH_M: Final = 4.5
@@ -38,15 +37,6 @@ MAX_ACCEL_MPS2: Final = 4.0
 MAX_BRAKE_MPS2: Final = 8.0
 WANDER_LENGTH_M: Final = 50.0  # correlation length of a driver's drift within the lane
 WANDER_ROUNDING_M: Final = 6.0  # the drift's own smoothness, so that it adds hardly any curvature
-
-
-class EgoSpec(Spec):
-    """How the ego drives."""
-
-    lateral_accel_mps2: float = Field(2.5, gt=0.2, le=3.0)
-    accel_mps2: float = Field(1.8, gt=0.2, le=4.0)
-    decel_mps2: float = Field(2.0, gt=0.2, le=4.0)
-    lateral_wander_m: float = Field(0.0, ge=0.0, le=1.0)  # standard deviation of the drift about the lane's centre
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,12 +10,11 @@ import time
 import pytest
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.files.progress import read_progress
 from hippodrome.eval.pool import INTERRUPTED, worker_pool
 
 SCRIPT = """
 import signal, sys, time
-from hippodrome.eval.files.progress import read_progress
-from hippodrome.eval.files.progress import read_progress
 from hippodrome.eval.pool import INTERRUPTED, perform, worker_pool
 if __name__ == "__main__":
     handler, seconds = getattr(signal, sys.argv[1]), float(sys.argv[2])

@@ -68,7 +68,7 @@ site: setup  ## these documents and the docstrings as pages, in out/site; broken
 	@$(BIN)/python docs/site/make.py out/site-sources
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --clean && echo "written: out/site/index.html"
 
-cover: eval  ## make the README's picture and table anew from the default run
+cover: eval  ## make the README's film, picture and table anew from the default run
 	@$(BIN)/python -m hippodrome.eval.report.cover out/eval grid
 
 clean:  ## remove results, keep the environment

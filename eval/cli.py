@@ -16,6 +16,7 @@ from hippodrome.eval.commands.gate import add_gate_commands
 from hippodrome.eval.commands.methods import add_method_commands
 from hippodrome.eval.commands.run import add_drive_command
 from hippodrome.eval.commands.runs import add_run_commands
+from hippodrome.eval.commands.serve import add_serve_command
 from hippodrome.eval.commands.stages import add_stage_commands
 from hippodrome.eval.commands.sweep import add_sweep_command
 from hippodrome.eval.commands.trials import add_trial_commands
@@ -73,6 +74,7 @@ def make_parser() -> argparse.ArgumentParser:
     add_board_command(commands)
     add_gate_commands(commands)
     add_drive_command(commands)
+    add_serve_command(commands)
     add_stage_commands(commands)
     add_trial_commands(commands)
     add_sweep_command(commands)

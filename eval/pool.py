@@ -23,6 +23,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from hippodrome._processes import ENDING, die_with_parent, end_children
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.files.progress import Teller
 
 # In this time an executor's thread forgets the tasks that were cancelled. CPython 3.11 stumbles over them, with a traceback, if
 # the processes are gone first.
@@ -36,22 +37,6 @@ TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
 
 
-@dataclass(slots=True)
-class ProgressLines:
-    """What a run says line by line where there is no terminal: each stage, at each quarter of it."""
-
-    stage: str
-    wanted: bool
-    said: int = 0  # quarters: a stage that is refused at once says nothing but why
-
-    def say(self, done: int, total: int) -> None:
-        """Print a line to standard error if another quarter of the tasks is done."""
-        quarters = 4 * done // max(total, 1)
-        if self.wanted and quarters > self.said:
-            self.said = quarters
-            print(f"{self.stage}: {done} of {total} done", file=sys.stderr, flush=True)
-
-
 @dataclass(frozen=True, slots=True)
 class Workers:
     """A pool of processes and the progress display that goes with it."""
@@ -59,6 +44,7 @@ class Workers:
     executor: ProcessPoolExecutor
     progress: Progress
     processes: int
+    teller: Teller
 
     def run(
         self,
@@ -88,7 +74,7 @@ class Workers:
         bar = self.progress.add_task(stage, total=sum(weight(item) for item in tasks))
         items = {self.executor.submit(perform, task, item): item for item in tasks}
         futures = {future: weight(item) for future, item in items.items()}
-        lines = ProgressLines(stage, self.progress.disable)
+        self.teller.begin(stage, len(futures))
         pending, begun = set(futures), set[Future[ResultT]]()
         processes = list((getattr(self.executor, "_processes", None) or {}).values())  # no public way tells how one ended
         try:
@@ -103,7 +89,7 @@ class Workers:
                         pending.add(another)
                 begun = {future for future in pending if future.running()} or begun
                 self.progress.update(bar, total=sum(futures.values()))
-                lines.say(sum(future.done() for future in futures), len(futures))
+                self.teller.say(sum(future.done() for future in futures), len(futures))
             return [future.result() for future in futures]
         except BrokenProcessPool:
             places = sorted({place(items[future]) for future in begun or futures if not _ended_well(future)} - {""})
@@ -131,10 +117,18 @@ def _how_it_died(processes: Sequence[BaseProcess], places: Sequence[str]) -> str
 
 
 @contextmanager
-def worker_pool(workers: int) -> Iterator[Workers]:
-    """``workers`` processes with a progress display; they end with the context."""
+def worker_pool(workers: int, plan: Sequence[str] = (), folder: Path | None = None) -> Iterator[Workers]:
+    """``workers`` processes with a progress display; they end with the context.
+
+    Args:
+        workers: How many.
+        plan: Names of the stages that will be run, in their order, so that each can say what is next.
+        folder: Where the run writes; how far it is stands there in a file while it goes on. None: nowhere.
+    """
     with process_pool(workers) as executor, progress_bar() as progress:
-        yield Workers(executor, progress, workers)
+        teller = Teller(progress.disable, tuple(plan), folder)
+        yield Workers(executor, progress, workers, teller)
+        teller.end()
 
 
 @contextmanager

@@ -29,6 +29,7 @@ from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario
 
 RESULTS = "results.json"
+RECORD_STAGES = ("simulate", "render", "seal")  # of ``make_recordings``
 
 
 def evaluate(
@@ -57,7 +58,7 @@ def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path) -> Res
         entries_of(scenario)  # what cannot be loaded is said before anything is simulated
     require_gl()
     plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
-    with worker_pool(workers) as pool:
+    with worker_pool(workers, (*RECORD_STAGES, "evaluate"), out) as pool:
         make_recordings(plans, pool)
         tasks = [EvaluationTask(scenario, out) for scenario in scenarios]
         rows = pool.run("evaluate", evaluate_scenario, tasks)
@@ -73,7 +74,7 @@ def render(paths: Sequence[Path], network: Path | None, seed: int | None, worker
     scenarios = load_scenarios(paths, network, seed)
     require_gl()
     plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
-    with worker_pool(workers) as pool:
+    with worker_pool(workers, RECORD_STAGES, out) as pool:
         make_recordings(plans, pool)
     for plan in plans:
         print(plan.folder())
@@ -126,5 +127,6 @@ def _report(scenarios: Sequence[Scenario], results: Results, out: Path) -> bool:
     ]
     for failure in failures:
         print(f"threshold failed: {failure}", file=sys.stderr)
-    print(f"\nresults: {out / RESULTS}\ntables:  {out / 'table1.md'}\nfigures: {out}/<scenario>/*.png\nreport:  {out / REPORT}")
+    folders = "\n         ".join(str(out / result.name) for result in results.scenarios)
+    print(f"\nresults: {out / RESULTS}\ntables:  {out / 'table1.md'}\nfigures: {folders}\nreport:  {out / REPORT}")
     return not failures

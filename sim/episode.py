@@ -12,7 +12,6 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import FloatArray, Frame, GroundTruth, IntArray, Observation, Step
 from hippodrome.sim.drive import drive_pitch_rad
-from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scene.conditions import Conditions, apply_camera
 from hippodrome.sim.self_motion import SelfMotion
 from hippodrome.sim.traffic import traffic_at
@@ -103,11 +102,3 @@ def episode(renderer: FrameRenderer, drive: Drive, samples: Samples, conditions:
         number = int(samples.frame[i])
         frame = draw_frame(renderer, drive, samples, number, conditions, seed)[0] if number >= 0 else None
         yield samples.observation(i, frame), samples.ground_truth(i)
-
-
-def camera_divider(camera: CameraSpec, odometry_rate_hz: float) -> int:
-    """How many odometry steps pass per frame. Raises ValueError unless it is a whole number."""
-    every = round(odometry_rate_hz / camera.rate_hz)
-    if every < 1 or abs(every * camera.rate_hz - odometry_rate_hz) > 1e-6 * odometry_rate_hz:
-        raise ValueError(f"odometry_rate_hz {odometry_rate_hz:g} is not a whole multiple of camera.rate_hz {camera.rate_hz:g}")
-    return every

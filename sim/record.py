@@ -16,7 +16,7 @@ import numpy as np
 from hippodrome._files import PACKAGE, code_sha256, sha256_of
 from hippodrome.core.types import Frame
 from hippodrome.sim.drive import simulate_drive
-from hippodrome.sim.episode import Samples, camera_divider, draw_frame, sample_drive
+from hippodrome.sim.episode import Samples, draw_frame, sample_drive
 from hippodrome.sim.recording import (
     ANEW,
     CHUNK_FRAMES,
@@ -32,6 +32,7 @@ from hippodrome.sim.recording import (
     write_arrays,
     write_chunk,
 )
+from hippodrome.sim.render.camera import camera_divider
 from hippodrome.sim.scenario import DriveSpec, Scenario
 from hippodrome.sim.scene.build import build_scene
 from hippodrome.sim.self_motion import SelfMotionNoise, sense_self_motion

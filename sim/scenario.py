@@ -7,14 +7,13 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from hippodrome.core.localization.localizer import LocalizerConfig
+from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.mapping.mapper import MapperConfig
 from hippodrome.core.refinement.refine import RefineConfig
 from hippodrome.sim.ego_spec import EgoSpec
-from hippodrome.sim.episode import camera_divider
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.renamed import with_present_names
-from hippodrome.sim.render.camera import CameraSpec
+from hippodrome.sim.render.camera import CameraSpec, camera_divider
 from hippodrome.sim.scene.conditions import Conditions
 from hippodrome.sim.self_motion import NoiseLevel, SelfMotionNoise, noise_of
 from hippodrome.sim.spec import Spec

@@ -55,7 +55,7 @@ if __name__ == "__main__":
         sys.stdin.read()
 """
 # Progress without a terminal, and what Python says when it cleans up after a killed main process.
-EXPECTED_LINE = re.compile(r"^[\w -]+: \d+ of \d+ done$|resource_tracker")
+EXPECTED_LINE = re.compile(r"^[\w -]+: (\d+ of \d+ done, \d+ s|nothing to do)(; next: \w+)?$|resource_tracker")
 
 
 @dataclass(frozen=True)

@@ -91,6 +91,7 @@ def add_scenarios(parser: argparse.ArgumentParser, several: bool) -> None:
              "OpenDRIVE (default: the scenario's town)",
     )  # fmt: skip
     parser.add_argument("--seed", type=seed, metavar="N", help="replace the scenario's seed (default: the scenario's own)")
+    refuse_faults(parser)
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
@@ -131,6 +132,18 @@ def write_alone(parser: argparse.ArgumentParser) -> None:
             return run(options)
 
     parser.set_defaults(command=alone)
+
+
+def refuse_faults(parser: argparse.ArgumentParser) -> None:
+    """Let a command that takes ``scenarios`` begin by saying all that is wrong with their files, as `scenario validate`."""
+    run: Command = parser.get_default("command")
+
+    def checked(options: argparse.Namespace) -> int:
+        from hippodrome.eval.commands.scenario_files import has_faults
+
+        return BAD_INPUT if has_faults(options.scenarios) else run(options)
+
+    parser.set_defaults(command=checked)
 
 
 def _method(text: str) -> Any:

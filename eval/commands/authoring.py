@@ -103,10 +103,15 @@ def _new(options: argparse.Namespace) -> int:
 
 
 def _validate(options: argparse.Namespace) -> int:
-    from hippodrome.eval.authoring.check import check_scenario
+    from hippodrome.eval.commands.scenario_files import has_faults
 
     failed = False
     for path in options.files:
+        if has_faults([path]):
+            failed = True
+            continue
+        from hippodrome.eval.authoring.check import check_scenario  # not before it is needed: faults are said at once
+
         finding = check_scenario(path)
         failed |= bool(finding.errors)
         if finding.errors:

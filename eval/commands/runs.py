@@ -89,13 +89,13 @@ def _report(options: argparse.Namespace) -> int:
     page = write_report(options.results)
     print(page)
     if options.open:
-        show(page)
+        show(page.resolve().as_uri())
     return DONE
 
 
-def show(page: Path) -> None:
+def show(address: str) -> None:
     """Show a page in the user's browser; where there is none, say so on standard error."""
     import webbrowser
 
-    if not webbrowser.open(page.resolve().as_uri()):
-        print(f"{page}: no browser to show it in was found; open the file in one", file=sys.stderr)
+    if not webbrowser.open(address):
+        print(f"{address}: no browser to show it in was found; open it in one", file=sys.stderr)

@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_methods, add_out, add_workers, seed
+from hippodrome.eval.commands.arguments import (
+    DONE,
+    THRESHOLD_FAILED,
+    add_command,
+    add_methods,
+    add_out,
+    add_workers,
+    refuse_faults,
+    seed,
+)
 
 
 def add_sweep_command(commands: Any) -> None:
@@ -24,6 +33,7 @@ def add_sweep_command(commands: Any) -> None:
          "hippodrome sweep scenarios/towns/grid.yaml --set localizer.mode=coupled,kalman --set camera.rate_hz=5,10"],
     )  # fmt: skip
     parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.yaml", help="a scenario's file")
+    refuse_faults(parser)
     parser.add_argument(
         "--seeds",
         type=seed,

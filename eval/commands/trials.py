@@ -15,6 +15,7 @@ from hippodrome.eval.commands.arguments import (
     localizer_mode,
     positive,
     positive_number,
+    refuse_faults,
     seed,
 )
 
@@ -46,6 +47,7 @@ def add_trial_commands(commands: Any) -> None:
     stress.add_argument(
         "scenarios", type=Path, nargs="+", metavar="SCENARIO.yaml", help="a scenario's file; its mapping drive is used"
     )
+    refuse_faults(stress)
     stress.add_argument(
         "--seeds", type=seed, nargs="+", default=[1, 2, 3, 4, 5], metavar="N",
         help="seeds that replace the scenarios' own, one run each (default: 1 2 3 4 5)",
@@ -75,6 +77,7 @@ def add_trial_commands(commands: Any) -> None:
         "scenarios", type=Path, nargs="+", metavar="SCENARIO.yaml",
         help="a scenario's file; its mapping drive is mapped, its localization drive is localized under each condition",
     )  # fmt: skip
+    refuse_faults(robust)
     robust.add_argument(
         "--conditions", nargs="+", metavar="NAME",
         help=f"run these conditions only (default: all of them). There are: {', '.join(CONDITIONS)}",

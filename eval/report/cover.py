@@ -1,4 +1,4 @@
-"""The README's picture and table, from a finished run: ``python -m hippodrome.eval.report.cover out/eval grid`` in its folder."""
+"""The README's film, picture and table: ``python -m hippodrome.eval.report.cover out/eval grid``, in the README's folder."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.eval.figures.style import BLUE, ERROR_MAP, ROAD, TRUTH, Axes, new_figure, save_figure
 from hippodrome.eval.methods.method import SEMI_METRIC, TOPOMETRIC
 from hippodrome.eval.report.evidence import MAP_JSON, THUMBNAILS, Layer, MapEvidence, read_map_evidence
+from hippodrome.eval.report.film import draw_film
 from hippodrome.eval.results import markdown
 from hippodrome.eval.results.model import Row, ScenarioResult, read_results, result_of
 from hippodrome.eval.results.paper_rows import quoted_rows
@@ -32,7 +33,7 @@ SHOWN: Final = (SEMI_METRIC.label, TOPOMETRIC.label)
 COLOUR_RANGE_M: Final = (0.05, 5.0)  # of the errors, from a tyre's width to a car's length
 README_COLUMNS: Final = ("Method", "CPU (%)", "APE (m)", "APE SE(2) (m)", "APE Sim(2) (m)", "RPE (m)")
 FRAMES: Final = 4  # shown of the drive, in two rows
-PICTURE, README = Path("docs/result.png"), Path("README.md")
+FILM, PICTURE, README = Path("docs/film.webp"), Path("docs/result.png"), Path("README.md")
 BEGIN, END = "<!-- table: made by hippodrome.eval.report.cover -->\n", "<!-- end of table -->"
 
 
@@ -124,8 +125,9 @@ def with_table(text: str, result: ScenarioResult, quoted: Sequence[Row]) -> str:
 
 
 def main(run: Path, name: str) -> None:
-    """Make picture and table of one scenario of a run anew, in the working directory's docs and README."""
+    """Make film, picture and table of one scenario of a run anew, in the working directory's docs and README."""
     draw_cover(run, name, PICTURE)
+    draw_film(run, name, FILM)
     result = result_of(read_results(run / "results.json"), name)
     write_atomically(README, with_table(README.read_text(encoding="utf-8"), result, quoted_rows()).encode())
 

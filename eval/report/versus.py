@@ -78,7 +78,7 @@ def write_versus(
             element("section", element("h2", "What moved"), moved, _list(lost)),
             sections or element("p", "There is no map to show: both folders need a scenario's map.json.", class_="note"),
         ),
-        element("footer", "Made by ", element("code", f"hippodrome compare {before} {after} --html"), "; no test and no verdict."),
+        element("footer", "Made by ", element("code", f"hippodrome compare {before} {after} --html"), "; it is no test."),
     ]  # fmt: skip
     write_atomically(path, page("hippodrome compare", body, SCRIPTS).encode())
 

@@ -73,3 +73,11 @@ def projection(spec: CameraSpec) -> FloatArray:
     matrix[2, 3] = -2.0 * FAR_M * NEAR_M / (FAR_M - NEAR_M)
     matrix[3, 2] = -1.0
     return matrix
+
+
+def camera_divider(camera: CameraSpec, odometry_rate_hz: float) -> int:
+    """How many odometry steps pass per frame. Raises ValueError unless it is a whole number."""
+    every = round(odometry_rate_hz / camera.rate_hz)
+    if every < 1 or abs(every * camera.rate_hz - odometry_rate_hz) > 1e-6 * odometry_rate_hz:
+        raise ValueError(f"odometry_rate_hz {odometry_rate_hz:g} is not a whole multiple of camera.rate_hz {camera.rate_hz:g}")
+    return every

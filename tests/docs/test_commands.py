@@ -32,6 +32,7 @@ EXPENSIVE = {  # parsed only; what runs them instead
     "baselines": "most of an hour; tests/eval/trials/rivals and tests/eval/rivals run short drives",
     "method": "half a minute a method; tests/eval/contest runs its parts",
     "run": "a drive and a map; tests/eval/real runs small ones",
+    "serve": "goes on until it is interrupted; tests/eval/report asks it",
     "gate": "an evaluation a seed; tests/eval/gate judges stored results. `gate --power` is run",
 }
 VALUES = {"N": "1", "MIN": "5", "WxH": "64x48", "FORMAT": "tum"}  # of placeholders that are no files

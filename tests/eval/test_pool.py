@@ -10,6 +10,7 @@ import time
 import pytest
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.files.progress import read_progress
 from hippodrome.eval.pool import INTERRUPTED, worker_pool
 
 SCRIPT = """
@@ -65,7 +66,7 @@ def test_an_interrupt_ends_busy_and_idle_workers_quietly_unless_it_is_ignored(tm
         assert process.stdout.readline() == "ready\n"
         os.killpg(process.pid, signal.SIGINT)
         said = process.communicate(timeout=30)[1]
-    complaints = [line for line in said.splitlines() if not re.fullmatch(r"wait: \d of 4 done", line)]
+    complaints = [line for line in said.splitlines() if not re.fullmatch(r"wait: \d of 4 done, \d+ s", line)]
     assert (process.returncode, complaints) == (status, [])
 
 
@@ -73,5 +74,18 @@ def test_without_a_terminal_each_quarter_of_a_stage_is_a_line(capsys):
     with worker_pool(1) as pool:
         pool.run("size", abs, list(range(8)))
     lines = capsys.readouterr().err.splitlines()
-    assert lines[-1] == "size: 8 of 8 done"
+    assert re.fullmatch(r"size: 8 of 8 done, \d+ s", lines[-1])
     assert 1 <= len(lines) <= 5
+
+
+def test_each_stage_says_its_time_and_what_is_next_and_keeps_it_while_the_run_goes_on(capsys, tmp_path):
+    with worker_pool(1, ("load", "size", "weigh"), tmp_path) as pool:
+        pool.run("load", abs, [])
+        pool.run("size", abs, [1, 2])
+        kept = read_progress(tmp_path)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "load: nothing to do; next: size"
+    assert re.fullmatch(r"size: 2 of 2 done, \d+ s; next: weigh", lines[-1])
+    assert kept.plan == ("load", "size", "weigh")
+    assert [(stage.name, stage.done, stage.total) for stage in kept.stages] == [("load", 0, 0), ("size", 2, 2)]
+    assert read_progress(tmp_path) is None and list(tmp_path.iterdir()) == []

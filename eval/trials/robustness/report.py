@@ -38,7 +38,7 @@ def report_town(folder: Path, name: str, found: Findings) -> None:
     draw_heat_map(folder / "robustness.png", name, found.table)
     draw_curves(folder / "places.png", name, found.places)
     _write_page(folder, name, text)
-    print(f"{text}\nwritten: {folder}/robustness.json, .md, .png, .html, places.png")
+    print(f"{text}\nwritten: {folder / 'robustness.html'}, beside it the same as JSON, Markdown and pictures")
 
 
 def report_towns(out: Path, towns: Mapping[str, Findings]) -> None:
@@ -56,7 +56,7 @@ def report_towns(out: Path, towns: Mapping[str, Findings]) -> None:
     _write(out, {"towns": by_town, **pooled.summary()}, text)
     draw_heat_map(out / "robustness.png", f"{ALL_TOWNS} ({', '.join(towns)})", pooled.table)
     _write_page(out, ALL_TOWNS, text)
-    print(f"{text}\nwritten: {out}/robustness.json, .md, .png, .html")
+    print(f"{text}\nwritten: {out / 'robustness.html'}, beside it the same as JSON, Markdown and a picture")
 
 
 def _write_page(folder: Path, name: str, text: str) -> None:

@@ -22,7 +22,7 @@ from hippodrome.eval.contest.entry import Added, entries_of
 from hippodrome.eval.methods.materials import refine_config
 from hippodrome.eval.methods.stages import map_recording
 from hippodrome.eval.pool import Workers, worker_pool
-from hippodrome.eval.run import load_scenarios, make_recordings
+from hippodrome.eval.run import RECORD_STAGES, load_scenarios, make_recordings
 from hippodrome.eval.trials.robustness.conditions import CONDITIONS, SAME, chosen
 from hippodrome.eval.trials.robustness.findings import Findings
 from hippodrome.eval.trials.robustness.kidnapping import Kidnapping, kidnappings
@@ -42,6 +42,7 @@ from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.survey import with_survey_error
 from hippodrome.sim.town import TownSpec
 
+STAGES: Final = (*RECORD_STAGES, "map", "localize", "methods", "places", "kidnap", "lengths")  # of each town
 ELSEWHERE_SEED: Final = 1_000  # added to the scenario's seed: another town of the same kind
 
 
@@ -81,7 +82,7 @@ def robustness(request: RobustnessRequest) -> None:
     if request.only is not None and request.only > request.sequences:
         raise HippodromeError(f"--start {request.only}: there are {request.sequences} starts, see --sequences")
     require_gl()
-    with worker_pool(request.workers) as pool:
+    with worker_pool(request.workers, STAGES, request.out) as pool:
         towns = {one.name: found for one in scenarios if (found := _town(one, conditions, request, pool)) is not None}
     if len(towns) > 1:
         report_towns(request.out, towns)

@@ -23,7 +23,7 @@ from hippodrome.eval.pool import worker_pool
 from hippodrome.eval.report.pages import write_trial_page
 from hippodrome.eval.results.model import to_json
 from hippodrome.eval.reuse import figure_code_sha256
-from hippodrome.eval.run import make_recordings
+from hippodrome.eval.run import RECORD_STAGES, make_recordings
 from hippodrome.eval.trials.stress.cases import StressCase, chosen_cases, in_self_similar_grid
 from hippodrome.eval.trials.stress.rows import StressRow
 from hippodrome.eval.trials.stress.table import stress_markdown
@@ -83,7 +83,7 @@ def stress(
     tasks = [task for path in paths for seed in seeds for task in _tasks(path, seed, cases, out, path == paths[0], methods)]
     for scenario in {task.scenario.name: task.scenario for task in tasks}.values():
         _say_left_out(scenario)
-    with worker_pool(workers) as pool:
+    with worker_pool(workers, (*RECORD_STAGES, "refine"), out) as pool:
         make_recordings([task.plan() for task in tasks], pool)
         rows = [row for part in pool.run("refine", run_cases, tasks, weight=lambda task: len(task.cases)) for row in part]
     rows.sort(key=lambda row: (row.method != "", row.method, [case.name for case in cases].index(row.case)))

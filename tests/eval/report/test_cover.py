@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.report.cover import (
@@ -14,6 +15,7 @@ from hippodrome.eval.report.cover import (
     with_table,
 )
 from hippodrome.eval.report.evidence import MapEvidence
+from hippodrome.eval.report.film import draw_film
 from hippodrome.eval.results.model import (
     ErrorSummary,
     LocalizationSummary,
@@ -24,6 +26,7 @@ from hippodrome.eval.results.model import (
     write_results,
 )
 from hippodrome.eval.results.paper_rows import quoted_rows
+from tests.eval.report.samples import write_run
 
 ROOT = Path(__file__).parents[3]
 PATH = {"t_s": [0.0, 1.0, 2.0], "x_m": [0.0, 50.0, 50.0], "y_m": [0.0, 0.0, 40.0]}
@@ -82,3 +85,27 @@ def test_the_readme_has_both_and_the_picture_is_small():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert "| topometric |" in text.split(BEGIN)[1].split(END)[0]
     assert (ROOT / "docs" / "result.png").stat().st_size < 200_000
+
+
+def test_the_film_tells_the_story_in_eight_seconds_and_is_the_same_each_time(tmp_path):
+    write_run(tmp_path)
+    for name in ("one.webp", "two.webp"):
+        draw_film(tmp_path, "town & co", tmp_path / name)
+    with Image.open(tmp_path / "one.webp") as film:
+        durations_ms = [(film.seek(number), film.load(), film.info["duration"])[2] for number in range(film.n_frames)]
+    assert 7_500 <= sum(durations_ms) <= 8_500 and len(durations_ms) > 40
+    assert (tmp_path / "one.webp").read_bytes() == (tmp_path / "two.webp").read_bytes()
+
+
+def test_a_film_needs_a_map_that_did_not_fail(tmp_path):
+    write_run(tmp_path)
+    data = evidence("semi-metric")
+    (tmp_path / "town & co" / "map.json").write_text(data.model_dump_json())
+    with pytest.raises(HippodromeError, match="no map 'topometric', for it failed"):
+        draw_film(tmp_path, "town & co", tmp_path / "one.webp")
+
+
+def test_the_readme_begins_with_the_film_which_is_small():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert "(docs/film.webp)" in text[:300]
+    assert (ROOT / "docs" / "film.webp").stat().st_size < 3_000_000

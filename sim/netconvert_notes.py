@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -37,6 +38,7 @@ MEANINGS: Final[tuple[tuple[str, str], ...]] = (
     ("Discarding", "such roads are not for cars and were left out; nothing to do"),
 )
 UNKNOWN: Final = "look there in netedit"
+TOTAL: Final = re.compile(r"(\d+) total messages of type:? (.+)")
 
 
 def netconvert_notes(log: Sequence[str], made: Path) -> tuple[str, ...]:
@@ -49,24 +51,34 @@ def netconvert_notes(log: Sequence[str], made: Path) -> tuple[str, ...]:
     Returns:
         One note for each kind of warning, the gravest first; after ``MAX_NOTES`` of them a count of the others.
     """
-    kinds: dict[str, list[str]] = {}
+    first: dict[str, str] = {}  # of each kind, the first warning
+    count: Counter[str] = Counter()
     for line in log:
         if line.startswith("Warning: "):
             text = line.removeprefix("Warning: ").strip()
-            kinds.setdefault(re.sub(r"'[^']*'|[-\d.]+", "#", text), []).append(text)
-    alike = sorted(kinds.values(), key=lambda same: _meaning(same[0])[0])
-    network = made.read_text(encoding="utf-8", errors="replace") if alike and made.is_file() else ""
-    notes = [_note(same, network) for same in alike[:MAX_NOTES]]
-    hidden = sum(len(same) for same in alike[MAX_NOTES:])
-    more = f"netconvert: {hidden} warnings of {len(alike) - MAX_NOTES} more kinds; run netconvert on the map to see them"
+            if total := TOTAL.match(text):  # said at the end of those of a kind of which not all were shown
+                count[_kind(total[2].replace("%", "0"))] = int(total[1])
+            else:
+                count[_kind(text)] += 1
+                first.setdefault(_kind(text), text)
+    kinds = sorted(first, key=lambda kind: _meaning(first[kind])[0])
+    network = made.read_text(encoding="utf-8", errors="replace") if kinds and made.is_file() else ""
+    notes = [_note(first[kind], count[kind], network) for kind in kinds[:MAX_NOTES]]
+    hidden = sum(count[kind] for kind in kinds[MAX_NOTES:])
+    more = f"netconvert: {hidden} warnings of {len(kinds) - MAX_NOTES} more kinds; run netconvert on the map to see them"
     return (*notes, *([more] if hidden else []))
 
 
-def _note(same: Sequence[str], network: str) -> str:
-    """The note on warnings of one kind."""
-    text = same[0].rstrip(".")
-    count = f" ({len(same)} of this kind)" if len(same) > 1 else ""
-    return f"netconvert: {text}{_place(text, network)}{count}: {_meaning(text)[1]}"
+def _kind(text: str) -> str:
+    """A warning without its names and numbers."""
+    return re.sub(r"'[^']*'|[-\d.]+", "#", text)
+
+
+def _note(warning: str, count: int, network: str) -> str:
+    """The note on warnings of one kind, of which this is the first."""
+    text = warning.rstrip(".")
+    alike = f" ({count} of this kind)" if count > 1 else ""
+    return f"netconvert: {text}{_place(text, network)}{alike}: {_meaning(text)[1]}"
 
 
 def _meaning(text: str) -> tuple[int, str]:

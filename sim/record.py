@@ -124,9 +124,13 @@ def prepare(plan: RecordingPlan) -> list[int]:
     return [chunk for chunk in range(chunk_count(samples)) if not chunk_path(folder, chunk).exists()]
 
 
-def simulate(plan: RecordingPlan) -> tuple[Drive, Samples]:
-    """The plan's drive, and what is sensed on it, without frames. Nothing is written but a town that has to be generated."""
-    scenario, town, noise = plan.scenario, plan.town(), plan.scenario.self_motion_noise
+def simulate(plan: RecordingPlan, town: Town | None = None) -> tuple[Drive, Samples]:
+    """The plan's drive, and what is sensed on it, without frames. Nothing is written but a town that has to be generated.
+
+    A large town takes seconds to read: who has it already gives it.
+    """
+    scenario, noise = plan.scenario, plan.scenario.self_motion_noise
+    town = plan.town() if town is None else town
     spec = plan.drive_spec
     ego = spec.ego.model_copy(update={"lateral_wander_m": max(spec.ego.lateral_wander_m, noise.lateral_wander_m)})
     drive = simulate_drive(town, spec.tour, spec.traffic, ego, plan.seed)

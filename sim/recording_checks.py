@@ -11,6 +11,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
+from hippodrome._native import unheard
 from hippodrome.core.types import Frame
 
 MAX_FRAME_BYTES: Final = 64 << 20  # of one image in its file; 12 megapixels of noise take 36 MB
@@ -92,7 +93,8 @@ def decoded_png(blob: bytes) -> Frame:
     if not 0 < width * height <= MAX_PIXELS:
         raise ValueError(f"{width} x {height} pixels, the limit is {MAX_PIXELS} in all")
     try:
-        image = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
+        with unheard():
+            image = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
     except cv2.error as error:
         raise ValueError(f"not a PNG image ({' '.join(str(error).split())[:100]})") from None
     if image is None:

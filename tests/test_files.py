@@ -2,12 +2,13 @@
 
 import ast
 import hashlib
+import os
 import sys
 from pathlib import Path
 
 import pytest
 
-from hippodrome import _files, _folders
+from hippodrome import _files, _folders, _native
 from hippodrome._files import code_sha256, replacing, sha256_of, write_atomically
 from hippodrome.core.types import HippodromeError
 
@@ -83,9 +84,19 @@ def test_the_hash_of_code_is_of_names_and_contents_also_behind_a_link(tmp_path):
 def test_it_lies_beneath_all_parts():
     """They import the standard library, each other and the error of ``core.types``, so that every part may import them."""
     found = set()
-    for module in (_files, _folders):
+    for module in (_files, _folders, _native):
         for node in ast.walk(ast.parse(Path(module.__file__).read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom | ast.Import):
                 found |= {node.module} if isinstance(node, ast.ImportFrom) else {alias.name for alias in node.names}
     beneath = {"hippodrome.core.types", "hippodrome._folders"}
     assert {name for name in found if name.split(".")[0] not in sys.stdlib_module_names} == beneath
+
+
+def test_what_native_libraries_say_is_unheard_and_the_rest_is_not(capfd):
+    with _native.unheard():
+        os.write(2, b"libpng error: bad adaptive filter value")
+    os.write(2, b"said by us")
+    with pytest.raises(ValueError, match="x"), _native.unheard():
+        raise ValueError("x")
+    os.write(2, b" and again")
+    assert capfd.readouterr().err == "said by us and again"

@@ -56,7 +56,7 @@ def preview_scenario(scenario: Scenario, out: Path) -> Preview:
     require_gl()
     plans = {role: RecordingPlan(scenario, role, out) for role in ROLES}
     town = plans["mapping"].town()
-    simulated = dict(zip(plans, _simulated(scenario, list(plans.values())), strict=True))
+    simulated = dict(zip(plans, _simulated(scenario, list(plans.values()), town), strict=True))
     drives = {role: drive for role, (drive, _) in simulated.items()}
     samples = {role: sampled for role, (_, sampled) in simulated.items()}
     mapping, second = drives["mapping"], drives["localization"]
@@ -69,13 +69,17 @@ def preview_scenario(scenario: Scenario, out: Path) -> Preview:
     return preview
 
 
-def _simulated(scenario: Scenario, plans: list[RecordingPlan]) -> list[tuple[Drive, Samples]]:
+def _simulated(scenario: Scenario, plans: list[RecordingPlan], town: Town) -> list[tuple[Drive, Samples]]:
     """The drives. Those on somebody's network are simulated in processes of their own: SUMO crashes on some networks."""
     network = scenario.town.network
     if network is None:
-        return [simulate(plan) for plan in plans]
+        return [simulate(plan, town) for plan in plans]
     with worker_pool(len(plans)) as pool:
-        return pool.run("simulate", simulate, plans, place=lambda _: str(network))
+        return pool.run("simulate", _simulate, [(plan, town) for plan in plans], place=lambda _: str(network))
+
+
+def _simulate(task: tuple[RecordingPlan, Town]) -> tuple[Drive, Samples]:
+    return simulate(*task)
 
 
 def visits_of_road(network: RoadNetwork, lane: IntArray) -> IntArray:

@@ -252,6 +252,13 @@ def test_warnings_have_place_meaning_and_cure(tmp_path):
     assert len(notes) == 6 and notes[5].startswith("netconvert: 2 warnings of 2 more kinds")
 
 
+def test_warnings_that_netconvert_only_counts_are_counted_with_their_kind(tmp_path):
+    log = [*(f"Warning: Found angle of {a}.5 degrees at edge 'e{a}', segment 0." for a in (91, 92, 93)),
+           "Warning: 25 total messages of type: Found angle of % degrees at edge '%', segment %."]  # fmt: skip
+    (note,) = netconvert_notes(log, tmp_path / "none.net.xml")
+    assert note.startswith("netconvert: Found angle of 91.5 degrees at edge 'e91', segment 0 (25 of this kind): cars slow down")
+
+
 def test_a_comma_in_a_folder_and_capitals_in_a_name_do_no_harm(tmp_path):
     folder = tmp_path / "a,b c"
     folder.mkdir()

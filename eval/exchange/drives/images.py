@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from hippodrome._native import unheard
 from hippodrome.core.types import Frame
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignFrame
@@ -33,7 +34,8 @@ def decode(frame: ForeignFrame) -> Frame:
         raise ExchangeError(f"{frame.name}: not an image ({' '.join(str(error).split())[:80]})") from None
     if width * height > MAX_PIXELS or min(width, height) < 16:
         raise ExchangeError(f"{frame.name}: {width} x {height} pixels; at least 16 a side, at most {MAX_PIXELS} in all")
-    image: Any = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)  # turns it as the camera was held
+    with unheard():
+        image: Any = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)  # turns it as the camera was held
     if image is None or image.shape[:2] not in ((height, width), (width, height) if turned else (height, width)):
         raise ExchangeError(f"{frame.name}: a damaged image")
     return np.ascontiguousarray(image[:, :, ::-1])

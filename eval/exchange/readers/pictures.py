@@ -10,6 +10,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
+from hippodrome._native import unheard
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignDrive, ForeignFrame
@@ -69,7 +70,8 @@ class _Video:
     def _open(self) -> cv2.VideoCapture:
         if not self._path.is_file():
             raise ExchangeError(f"{self._path}: no such file")
-        capture = cv2.VideoCapture(str(self._path), cv2.CAP_FFMPEG)
+        with unheard():
+            capture = cv2.VideoCapture(str(self._path), cv2.CAP_FFMPEG)
         if not capture.isOpened():
             raise ExchangeError(
                 f"{self._path}: not a video that OpenCV can read; convert it: ffmpeg -i {self._path.name} drive.mp4"
@@ -86,10 +88,11 @@ class _Video:
     def times_s(self) -> FloatArray:
         """Time stamps (N,) of all frames, from 0 on. Raises ExchangeError if there is no frame, or too many."""
         capture, found = self._open(), []
-        while capture.grab():
-            found.append(capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
-            if len(found) > MAX_VIDEO_FRAMES:
-                raise ExchangeError(f"{self._path}: more than {MAX_VIDEO_FRAMES} frames; cut it into drives")
+        with unheard():
+            while capture.grab():
+                found.append(capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
+                if len(found) > MAX_VIDEO_FRAMES:
+                    raise ExchangeError(f"{self._path}: more than {MAX_VIDEO_FRAMES} frames; cut it into drives")
         if not found:
             raise ExchangeError(f"{self._path}: no frame in it can be decoded")
         return np.array(found) - found[0]
@@ -98,9 +101,10 @@ class _Video:
         """Frame ``number`` as an uncompressed image file. Raises ExchangeError."""
         if number < self._next:
             self._capture, self._next = self._open(), 0
-        while self._next < number and self._capture.grab():
-            self._next += 1
-        read, image = self._capture.read()
+        with unheard():
+            while self._next < number and self._capture.grab():
+                self._next += 1
+            read, image = self._capture.read()
         self._next += 1
         if not read:
             raise ExchangeError(

@@ -12,12 +12,12 @@ from hippodrome.core.matching.lane_choice import unknown_lane_sigma_m
 from hippodrome.core.matching.projection import reproject
 from hippodrome.core.matching.route_line import RouteLine
 from hippodrome.core.refinement.covariance import posterior_covariance, with_systematic_errors
+from hippodrome.core.refinement.factors import State
+from hippodrome.core.refinement.map_error import MapErrorModel
 from hippodrome.core.refinement.noise import Noise, rescaled, variance_factors
 from hippodrome.core.refinement.residuals import (
     Factors,
-    MapErrorModel,
     RoadTargets,
-    State,
     all_factors,
     normal_equations,
     stepped,

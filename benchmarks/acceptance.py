@@ -7,11 +7,14 @@ that they drove. ``--networks`` adds drives through other networks; each drive i
     python -m benchmarks.acceptance --seeds 3
     python -m benchmarks.acceptance --seeds 1 --networks a.net.xml b.net.xml
 
+    python -m benchmarks.acceptance --seeds 1 --real semi.pbstream map.net.xml
+
 A row of the table is one kind of offer at one length. *Accepted* is the share of samples that are vouched for, *wrong* the share
 that is vouched for and 20 m or more off the true place (of a control: all that is vouched for), *some wrong* the number of drives
 with any of that. Below, the evidence by which segments are accepted, as a curve (ROC): for each threshold, the share of the
 segments on the right road that have as much, and of those that are not. The logistic fit to them is the probability that a
-segment is right.
+segment is right. Last, how far each drive goes in its own network until any of it is vouched for; ``--real`` adds semi-metric
+maps of real drives there.
 """
 
 from __future__ import annotations
@@ -40,6 +43,8 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, MatchStatus, Visits
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.trials.stress.perturbations import without_roads
+from hippodrome.proto.codec import load_map
+from hippodrome.sim.network import read_network
 from hippodrome.sim.record import RecordingPlan, simulate
 from hippodrome.sim.scenario import DriveSpec, Scenario
 from hippodrome.sim.tour import TourSpec
@@ -52,6 +57,7 @@ NOISE = ("paper", "realistic", "harsh")
 FAR_M = 20.0  # as far off as a false fix
 DRIVEN_M = 12.0  # a road is gone if any point of it lies this close to the path
 CUT_NATS = 30.0  # evidence beyond this is not told apart
+LONGER = 20  # keyframes (100 m) by which the beginning of a drive grows until something is vouched for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +78,7 @@ class Offer:
     keyframes: int  # 0: the whole drive
     accepted: float  # share of samples
     wrong: float
-    seconds: float
+    seconds: float  # of CPU
     segments: tuple[tuple[float, bool], ...]  # evidence in nats, on the right road or not
 
 
@@ -153,19 +159,43 @@ def offers(drive: DrivenRoads, elsewhere: RoadNetwork | None, rng: np.random.Gen
                 yield offer(kind, keyframes, part.visits, network, None)
 
 
+def metres_until_vouched(visits: Visits, network: RoadNetwork) -> float:
+    """Metres of the shortest beginning of a drive, in steps of ``LONGER`` keyframes, of which a stretch is vouched for.
+
+    It is infinite if nothing of the whole drive is. The metres are those of the route that is found.
+    """
+    config, confidence = RouteSearchConfig(), ConfidenceConfig()
+    for count in range(2 * LONGER, len(visits.t_s) + LONGER, LONGER):
+        begun = replace(visits, t_s=visits.t_s[:count], vertex=visits.vertex[:count], motion=visits.motion[:count])
+        try:
+            problem = search_problem(begun, network, config)
+            route = most_likely_drive(problem, config)
+        except HippodromeError:
+            continue
+        if np.any(match_status(route, control_of(problem, config, route), confidence) == MatchStatus.MATCHED):
+            return float(np.sum(problem.track.step * np.exp(route.log_scale[1:])))
+    return float("inf")
+
+
+def print_metres(metres: FloatArray) -> None:
+    """How far the drives go until something is vouched for: half of them, nine of ten, and the longest."""
+    half, most, longest = np.quantile(metres, [0.5, 0.9, 1.0], method="higher")
+    print(f"\n{len(metres)} drives, driven until vouched for: median {half:.0f} m, 90 % {most:.0f} m, all {longest:.0f} m")
+
+
 def print_table(found: list[Offer]) -> None:
     """One row for each kind of offer and length."""
     groups: dict[tuple[str, int], list[Offer]] = defaultdict(list)
     for one in found:
         groups[one.kind, one.keyframes].append(one)
-    heads = ("keyframes", "drives", "accepted", "refused whole", "wrong", "some wrong", "CPU s")
+    heads = ("keyframes", "drives", "accepted", "refused whole", "wrong", "some wrong", "CPU s, mean", "CPU s, most")
     print(f"{'offered':9}" + "".join(f"{head:>15}" for head in heads))
     for (kind, keyframes), own in sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] or 10**6)):
         accepted, wrong, seconds = (np.array([getattr(one, name) for one in own]) for name in ("accepted", "wrong", "seconds"))
         refused, some_wrong = np.sum(accepted == 0.0), np.sum(wrong > 0.0)
         print(
             f"{kind:9}{keyframes or 'whole':>15}{len(own):15}{accepted.mean():15.3f}"
-            f"{refused:15}{wrong.mean():15.4f}{some_wrong:15}{seconds.mean():15.2f}"
+            f"{refused:15}{wrong.mean():15.4f}{some_wrong:15}{seconds.mean():15.2f}{seconds.max():15.2f}"
         )
 
 
@@ -192,6 +222,10 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--seeds", type=int, default=2, metavar="N", help="towns of each kind (default: 2)")
     parser.add_argument("--networks", type=Path, nargs="*", default=[], metavar="NET.xml", help="SUMO networks to drive in, too")
+    parser.add_argument(
+        "--real", type=Path, nargs=2, action="append", default=[], metavar=("MAP", "NET.xml"),
+        help="a semi-metric map of a real drive and its network, to see how far it goes until it is vouched for",
+    )  # fmt: skip
     options = parser.parse_args(arguments)
     rng, found = np.random.default_rng(0), []
     with TemporaryDirectory() as folder:
@@ -213,6 +247,9 @@ def main(arguments: list[str]) -> int:
         found += offers(drive, None if other is drive else other.network, rng)
     print_table(found)
     print_curve(found)
+    real = [(load_map(path)[0].visits, read_network(network)) for path, network in options.real]
+    own = [*((drive.visits, drive.network) for drive in drives), *real]
+    print_metres(np.array([metres_until_vouched(visits, network) for visits, network in own]))
     return 0
 
 

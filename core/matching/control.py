@@ -106,7 +106,8 @@ def evidence_nats(route: Route, first: int, end: int, control: Control, enough_n
     """Evidence that the samples ``first`` to ``end - 1`` of the route were driven: ``FACTOR`` times their log likelihood, less
     that of the decoys.
 
-    It is cut off at ``enough_nats``. The turns around one place are tried if the whole part leaves it open, or is too poor.
+    It is cut off at ``enough_nats``. The turns around one place are tried if the whole part leaves it open, or is too poor. They
+    are not if decoys explain the whole as well as the route does.
     """
     if turned_rad(route.track, first, end) < _LEAST_TURN_RAD:
         return 0.0
@@ -115,7 +116,8 @@ def evidence_nats(route: Route, first: int, end: int, control: Control, enough_n
     if (window_first, window_end) == (first, end) or not is_good:
         return _evidence_within(route, window_first, window_end, control, enough_nats)
     found = _evidence_within(route, first, end, control, enough_nats)
-    if found < enough_nats and _is_evident(route, window_first, window_end, control, enough_nats):
+    chance_does_as_well = found <= _own_nats(route, first, end) / FACTOR
+    if found < enough_nats and not chance_does_as_well and _is_evident(route, window_first, window_end, control, enough_nats):
         return enough_nats
     return found
 

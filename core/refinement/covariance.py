@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hippodrome.core.refinement.residuals import BinaryFactors, Factors, State, normal_equations
+from hippodrome.core.refinement.factors import BinaryFactors, State
+from hippodrome.core.refinement.residuals import Factors, normal_equations
 from hippodrome.core.solvers.chain import factorise, marginals
 from hippodrome.core.types import Edges, FloatArray
 

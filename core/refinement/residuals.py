@@ -3,9 +3,8 @@ to.
 
 The unknowns are (x, y, heading psi, log scale s) at each of S keyframes, s = ln(metres per map unit), and the gyro's gain error g
 and bias b. Where the road map has an accuracy, the error of the map (e_x, e_y) at each keyframe is unknown as well: how far the
-road there is drawn from where it is. A unary factor depends on one keyframe, a binary factor on two of them and perhaps on the
-gyro. Residuals are whitened, that is, divided by their standard deviations, and multiplied by the roots of their robust weights,
-as are the Jacobians.
+road there is drawn from where it is (``map_error``). Residuals are whitened, that is, divided by their standard deviations, and
+multiplied by the roots of their robust weights, as are the Jacobians.
 """
 
 from __future__ import annotations
@@ -15,6 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hippodrome.core.refinement.factors import BinaryFactors, State, UnaryFactors, normal_blocks
+from hippodrome.core.refinement.map_error import MapErrorFactors, MapErrorModel, add_map_error, map_error_factors
 from hippodrome.core.refinement.noise import Noise
 from hippodrome.core.se2 import between, wrap
 from hippodrome.core.solvers.chain import ChainSystem
@@ -23,40 +24,7 @@ from hippodrome.core.types import Edges, FloatArray, Visits
 
 GAIN_SIGMA = 0.05  # prior sigma of the gyro's gain error: cheap gyros are calibrated to a few percent
 BIAS_SIGMA_RADPS = 0.02  # prior sigma of the gyro's bias: about 1 deg/s
-LEAST_APART_M = 0.1  # places closer than this have one error of the map, but the equations must keep their condition
 GEMAN_MCCLURE = 3.0  # error of a closure in sigmas at which it has lost three quarters of its weight
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class State:
-    """Values of the unknowns."""
-
-    poses: FloatArray  # (S, 3) network frame, m, m, rad
-    log_scale: FloatArray  # (S,) ln(metres per map unit)
-    gyro: FloatArray  # (2,) gain error g and bias b (rad/s): true turn = (1 + g) measured turn + b dt
-    map_error_m: FloatArray | None = None  # (S, 2) drawn place of the road less its true one; None: the map is taken as exact
-
-    @property
-    def width(self) -> int:
-        """Unknowns of each keyframe: 4, or 6 with the error of the map."""
-        return 4 if self.map_error_m is None else 6
-
-    @property
-    def drawn_points_m(self) -> FloatArray:
-        """The keyframes' points (S, 2) on the map as it is drawn: where they are, moved as the map is there."""
-        points = self.poses[:, :2]
-        return points if self.map_error_m is None else points + self.map_error_m
-
-
-@dataclass(frozen=True, slots=True)
-class MapErrorModel:
-    """The error of the road map along the drive: an Ornstein-Uhlenbeck process in each axis, as neighbouring roads err alike.
-
-    Its covariance between two places that are d metres of driving apart is sigma_m^2 exp(-d / length_m).
-    """
-
-    sigma_m: float  # standard deviation in each axis
-    length_m: float  # correlation length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,26 +38,6 @@ class RoadTargets:
     weight: FloatArray  # (S,) 1, or next to 0 where nothing vouches for the road
     along_sigma_m: float  # sigma along the lane; infinite: the keyframe is drawn to the line, not to a point of it
     map_error: MapErrorModel | None = None  # None: the map is taken as exact
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class UnaryFactors:
-    """N factors of M components, each on one keyframe: keyframe n for factor n."""
-
-    residual: FloatArray  # (N, M) whitened, times the root of the weight
-    jacobian: FloatArray  # (N, M, 4 or 6) by the keyframe's unknowns, likewise
-    weight: FloatArray  # (N, M) robust weights
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BinaryFactors:
-    """N factors of M components between two keyframes, source and target."""
-
-    residual: FloatArray  # (N, M) whitened, times the root of the weight
-    source: FloatArray  # (N, M, 4 or 6) Jacobian by the source's unknowns, likewise
-    target: FloatArray  # (N, M, 4 or 6) Jacobian by the target's unknowns
-    gyro: FloatArray  # (N, M, 2) Jacobian by the gyro's gain error and bias
-    weight: FloatArray  # (N, M) robust weights
 
 
 class Factors(NamedTuple):
@@ -199,68 +147,26 @@ def closure_factors(state: State, closures: Edges, noise: Noise) -> BinaryFactor
     return BinaryFactors(residual * gain, source * gain[..., None], target * gain[..., None], no_gyro, weights)
 
 
-class MapErrorFactors(NamedTuple):
-    """What is known of the map's error beforehand; each part has a component for x and one for y."""
-
-    first: UnaryFactors  # N = 1: at the first keyframe
-    steps: BinaryFactors  # from each keyframe to the next
-    closures: BinaryFactors  # between the two ends of each closure
-
-
-def map_error_factors(state: State, visits: Visits, closures: Edges, model: MapErrorModel) -> MapErrorFactors:
-    """The error of the map as an Ornstein-Uhlenbeck process along the drive, and equal where the drive comes by again.
-
-        r_0 = e_0 / sigma,  r_i = (e_{i+1} - k_i e_i) / (sigma sqrt(1 - k_i^2)),  k_i = exp(-d_i / length)
-
-    d_i is the driven length of step i in metres. The ends of a closure lie d_ab apart, so that their errors differ by a variance
-    of 2 sigma^2 (1 - exp(-d_ab / length)).
-    """
-    error = state.map_error_m
-    assert error is not None
-    scale = np.exp(state.log_scale)
-    driven = scale[:-1] * np.hypot(visits.motion[1:, 0], visits.motion[1:, 1])
-    keep = np.exp(-np.maximum(driven, LEAST_APART_M) / model.length_m)
-    step_gain = 1.0 / (model.sigma_m * np.sqrt(1.0 - keep**2))
-    apart = np.maximum(scale[closures.source] * np.hypot(closures.motion[:, 0], closures.motion[:, 1]), LEAST_APART_M)
-    closure_gain = 1.0 / (model.sigma_m * np.sqrt(-2.0 * np.expm1(-apart / model.length_m)))
-    first = np.zeros((1, 2, state.width))
-    first[0, 0, 4] = first[0, 1, 5] = 1.0 / model.sigma_m
-    return MapErrorFactors(
-        UnaryFactors(error[:1] / model.sigma_m, first, np.ones((1, 2))),
-        _error_differences(error[1:] - keep[:, None] * error[:-1], keep, step_gain),
-        _error_differences(error[closures.target] - error[closures.source], np.ones_like(apart), closure_gain),
-    )
-
-
-def _error_differences(residual: FloatArray, keep: FloatArray, gain: FloatArray) -> BinaryFactors:
-    """Factors (N,) on e_target - keep e_source = ``residual`` (N, 2), whitened by ``gain`` (N,)."""
-    count = len(residual)
-    source, target = np.zeros((count, 2, 6)), np.zeros((count, 2, 6))
-    for axis in (0, 1):
-        source[:, axis, 4 + axis], target[:, axis, 4 + axis] = -keep * gain, gain
-    return BinaryFactors(residual * gain[:, None], source, target, np.zeros((count, 2, 2)), np.ones((count, 2)))
-
-
 def normal_equations(state: State, factors: Factors, closures: Edges) -> ChainSystem:
     """J^T J and -J^T r of all factors and of the gyro's prior, as a chain over the keyframes with the gyro as its border.
 
     The coupling J_a^T J_b between the two ends of a closure lies off the chain and is left out: the solver adds it.
     """
     odometry, road, closing, map_error = factors
-    diagonal, rhs = _normal_blocks(road.jacobian, road.residual)
-    by_source, rhs_source = _normal_blocks(odometry.source, odometry.residual)
-    by_target, rhs_target = _normal_blocks(odometry.target, odometry.residual)
+    diagonal, rhs = normal_blocks(road.jacobian, road.residual)
+    by_source, rhs_source = normal_blocks(odometry.source, odometry.residual)
+    by_target, rhs_target = normal_blocks(odometry.target, odometry.residual)
     diagonal[:-1] += by_source
     diagonal[1:] += by_target
     rhs[:-1] += rhs_source
     rhs[1:] += rhs_target
     for keyframe, jacobian in ((closures.source, closing.source), (closures.target, closing.target)):
-        blocks, sides = _normal_blocks(jacobian, closing.residual)
+        blocks, sides = normal_blocks(jacobian, closing.residual)
         np.add.at(diagonal, keyframe, blocks)
         np.add.at(rhs, keyframe, sides)
     upper = np.einsum("nmi,nmj->nij", odometry.source, odometry.target)
     if map_error is not None:
-        _add_map_error(map_error, closures, diagonal, upper, rhs)
+        add_map_error(map_error, closures, diagonal, upper, rhs)
     border = np.zeros((len(state.poses), state.width, 2))
     border[:-1] += np.einsum("nmi,nmg->nig", odometry.source, odometry.gyro)
     border[1:] += np.einsum("nmi,nmg->nig", odometry.target, odometry.gyro)
@@ -275,34 +181,12 @@ def normal_equations(state: State, factors: Factors, closures: Edges) -> ChainSy
     )
 
 
-def _add_map_error(factors: MapErrorFactors, closures: Edges, diagonal: FloatArray, upper: FloatArray, rhs: FloatArray) -> None:
-    """Add what is known of the map's error to the blocks of the normal equations, in place."""
-    first, steps, closing = factors
-    keyframes = len(diagonal)
-    for at, jacobian, residual in (
-        (np.zeros(1, np.int64), first.jacobian, first.residual),
-        (np.arange(keyframes - 1), steps.source, steps.residual),
-        (np.arange(1, keyframes), steps.target, steps.residual),
-        (closures.source, closing.source, closing.residual),
-        (closures.target, closing.target, closing.residual),
-    ):
-        blocks, sides = _normal_blocks(jacobian, residual)
-        np.add.at(diagonal, at, blocks)
-        np.add.at(rhs, at, sides)
-    upper += np.einsum("nmi,nmj->nij", steps.source, steps.target)
-
-
 def stepped(state: State, step: FloatArray, gyro_step: FloatArray) -> State:
     """The state after a Gauss-Newton step of the keyframes (S, 4 or 6) and of the gyro (2,)."""
     poses = state.poses + step[:, :3]
     poses[:, 2] = wrap(poses[:, 2])
     map_error = None if state.map_error_m is None else state.map_error_m + step[:, 4:]
     return State(poses, state.log_scale + step[:, 3], state.gyro + gyro_step, map_error)
-
-
-def _normal_blocks(jacobian: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Contribution of each factor to the normal equations: J^T J (N, B, B) and -J^T r (N, B)."""
-    return np.einsum("nmi,nmj->nij", jacobian, jacobian), -np.einsum("nmi,nm->ni", jacobian, residual)
 
 
 def _relative_pose_jacobians(a: FloatArray, seen: FloatArray, width: int) -> tuple[FloatArray, FloatArray]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -12,12 +12,12 @@ from hippodrome.core.matching.lane_choice import unknown_lane_sigma_m
 from hippodrome.core.matching.projection import reproject
 from hippodrome.core.matching.route_line import RouteLine
 from hippodrome.core.refinement.covariance import posterior_covariance, with_systematic_errors
+from hippodrome.core.refinement.factors import State
+from hippodrome.core.refinement.map_error import MapErrorModel
 from hippodrome.core.refinement.noise import Noise, rescaled, variance_factors
 from hippodrome.core.refinement.residuals import (
     Factors,
-    MapErrorModel,
     RoadTargets,
-    State,
     all_factors,
     normal_equations,
     stepped,
@@ -27,6 +27,8 @@ from hippodrome.core.solvers.chain import ChainFactor, marginals, solve_coupled
 from hippodrome.core.types import Edges, FloatArray, Visits
 
 MOST_CG_STEPS = 100  # iterations of conjugate gradients; 10-30 are usual, and the next round makes up for a step cut short
+
+_HELD_SIGMAS_M = (1000.0, 30.0)  # sigmas along a line that leaves the place on it open: they tell little and keep the condition
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +80,23 @@ def refine_along_route(
         vouched: 1 where a keyframe is believed to be on the road of the route, 0 where it may be off the network, (S,).
         free: mask (P,) of the samples of the line whose lane may be the wrong one of several parallel ones.
         config: number and constants of the rounds; without ``survey_sigma_m`` the line is taken as exact.
+
+    Where the whole line is straight, nothing tells how far along it the keyframes are, nor their scale. They are then held to
+    where the search has put them, loosely, so that a large covariance says so.
     """
+    for most_sigma_m in (np.inf, *_HELD_SIGMAS_M):
+        held = replace(config, along_sigma_m=tuple(min(sigma_m, most_sigma_m) for sigma_m in config.along_sigma_m))
+        solution = _refined(visits, closures, line, arc_m, log_scale, vouched, free, held)
+        if np.isfinite(solution.state.poses).all() and np.isfinite(solution.covariance).all():
+            break
+    return solution
+
+
+def _refined(
+    visits: Visits, closures: Edges, line: RouteLine, arc_m: FloatArray, log_scale: FloatArray, vouched: FloatArray,
+    free: BoolArray, config: SolverConfig,
+) -> RouteSolution:  # fmt: skip
+    """As ``refine_along_route``; not finite if the line leaves the unknowns open."""
     points, heading = points_on_line(line, arc_m)
     map_error = MapErrorModel(config.survey_sigma_m, config.survey_length_m) if config.survey_sigma_m else None
     no_error_yet = None if map_error is None else np.zeros_like(points)

@@ -57,6 +57,26 @@ def test_a_segment_is_judged_by_its_mirror_image_less_the_choice_of_it():
     assert found.evidence_nats == pytest.approx(30.0 - 2.0 * 1.9 - 4.0 * np.log(2.0))
 
 
+@pytest.mark.parametrize(
+    ("whole", "window", "evidence", "asked"),
+    [(-200.0, None, 9.0, 1), (-85.0, -60.0, 9.0, 2), (-85.0, -30.0, 5.0, 2), (-35.0, None, -45.0, 1)],
+    ids=["the whole is evident", "the window is", "neither is", "chance explains the whole as well"],
+)
+def test_the_whole_is_tried_first_and_then_the_turns_around_one_place(whole, window, evidence, asked):
+    """A drive of 400 samples costs 40 nats and is held to 80, its 120 samples that turn most to 24."""
+    answers = iter([whole, window])
+    drive, parts = route(np.where(np.arange(400) < 200, 0.0, 0.5 * np.pi), np.full(400, -40.0 / 399.0)), []
+
+    def control(first, end, least_nats, settled_nats):
+        parts.append((first, end))
+        return next(answers)
+
+    (found,) = with_evidence([RouteSegment(0, 400)], drive, control, 9.0)
+    assert found.evidence_nats == pytest.approx(evidence)
+    assert len(parts) == asked
+    assert parts[0] == (0, 400)
+
+
 def test_what_does_not_turn_is_no_evidence_and_is_not_searched():
     def control(first, end, least_nats, settled_nats):
         raise AssertionError("searched")

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from hippodrome.core.refinement.covariance import posterior_covariance, with_systematic_errors
+from hippodrome.core.refinement.factors import State
 from hippodrome.core.refinement.noise import Noise
 from hippodrome.core.refinement.residuals import (
     RoadTargets,
-    State,
     all_factors,
     normal_equations,
 )

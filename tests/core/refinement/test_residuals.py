@@ -6,17 +6,16 @@ import pytest
 
 from hippodrome.core import se2
 from hippodrome.core.refinement.edges import edges_where
+from hippodrome.core.refinement.factors import State
+from hippodrome.core.refinement.map_error import MapErrorModel, map_error_factors
 from hippodrome.core.refinement.noise import Noise
 from hippodrome.core.refinement.residuals import (
     BIAS_SIGMA_RADPS,
     GAIN_SIGMA,
     GEMAN_MCCLURE,
-    MapErrorModel,
     RoadTargets,
-    State,
     all_factors,
     closure_factors,
-    map_error_factors,
     normal_equations,
     odometry_factors,
     road_factors,

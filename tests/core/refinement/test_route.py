@@ -3,9 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hippodrome.core.mapping.motion_mapper import MotionMapper
 from hippodrome.core.refinement.route import RouteRefineConfig, refine_route
 from hippodrome.core.se2 import compose, wrap
-from hippodrome.core.types import EdgeKind, MatchStatus, Visits
+from hippodrome.core.types import EdgeKind, MatchStatus, Observation, Visits
+from tests.core.matching.drives import square_grid
 from tests.core.synthetic import grid_network, semi_metric_drive
 
 CONFIG = RouteRefineConfig()
@@ -177,3 +179,15 @@ def test_the_first_pose_of_the_map_does_not_matter(network, driven, refined):
     moved = replace(driven.cognitive_map, poses=compose(np.array([5.0, 6.0, 1.0]), driven.cognitive_map.poses))
     found = refine_route(moved, network, CONFIG)
     assert found.cognitive_map.poses.tobytes() == refined.cognitive_map.poses.tobytes()
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 0.001])
+def test_a_drive_without_a_turn_is_a_finite_map_that_nothing_vouches_for(turn_rad):
+    """Neither the place along the road nor the scale can be told: the equations alone have no unique solution."""
+    mapper = MotionMapper()
+    for i in range(40):
+        mapper.step(Observation(t_s=0.2 * i + 0.2, dt_s=0.2, speed=5.0, yaw_rate_radps=turn_rad, frame=None))
+    refined = refine_route(mapper.finish(), square_grid(columns=3, rows=3), CONFIG).cognitive_map
+    assert np.isfinite(refined.poses).all()
+    assert np.isfinite(refined.covariance).all()
+    assert np.all(refined.road_match.status != MatchStatus.MATCHED)

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hippodrome.core.matching.search import coarse
 from hippodrome.core.matching.search import passes as search_passes
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.route import search_route
@@ -47,6 +48,14 @@ def test_a_drive_searched_in_sections_gives_the_same_answer(town, drive, monkeyp
     np.testing.assert_array_equal(parts.score_nats, once.score_nats)
     np.testing.assert_array_equal(parts.alternatives.row_start, once.alternatives.row_start)
     np.testing.assert_allclose(parts.alternatives.through_nats, once.alternatives.through_nats, atol=1e-3)
+
+
+def test_a_network_searched_in_parts_gives_the_same_answer(town, drive, monkeypatch):
+    whole = search_route(drive[0], town, CONFIG)
+    monkeypatch.setattr(coarse, "_MOST_STATES", 9_000)
+    parted = search_route(drive[0], town, CONFIG)
+    assert parted.total_nats == pytest.approx(whole.total_nats, abs=0.01)
+    np.testing.assert_allclose(parted.points_m, whole.points_m, atol=1.0)
 
 
 def test_the_unit_of_length_does_not_matter(town, drive):

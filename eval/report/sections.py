@@ -25,7 +25,7 @@ from hippodrome.eval.report.tables import (
 )
 from hippodrome.eval.results.aligned import aligned_note
 from hippodrome.eval.results.model import Row, ScenarioResult
-from hippodrome.eval.results.tables import definitions, failed_runs, scenario_title
+from hippodrome.eval.results.tables import definitions, failed_runs, scenario_title, unscored_notes
 from hippodrome.eval.results.thresholds import failed_limits
 from hippodrome.sim.scenario import Thresholds
 
@@ -98,7 +98,7 @@ def _failures(scenario: ScenarioResult) -> Html | None:
     lines = [f"Limit: {line}" for line in _failed_limits(scenario) or []]
     lines += [f"{row.method} failed: {row.failure}" for row in scenario.rows if row.failure is not None]
     lines += [f"{row.method}: map refused: {row.refused}" for row in scenario.rows if row.refused is not None]
-    lines += failed_runs(scenario.rows)
+    lines += [*unscored_notes(scenario.rows), *failed_runs(scenario.rows)]
     return element("ul", [element("li", line) for line in lines], class_="failures") if lines else None
 
 

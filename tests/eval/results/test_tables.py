@@ -120,3 +120,10 @@ def test_where_an_aligned_rival_is_better_a_sentence_says_so():
     sentence = "semi-metric is better here than any map on the roads: 1.50 m, topometric (paper) 2.00 m."
     assert sentence in table_one_markdown(refused_results())
     assert "similarity fit, " not in table_one_markdown(results())
+
+
+def test_why_a_drive_without_truth_has_no_errors_is_said_once_for_all_its_methods():
+    scenario = results().scenarios[0]
+    rows = tuple(Row(method=name, unscored="the truth is not known", cpu_percent=1.0) for name in ("semi-metric", "topometric"))
+    markdown = table_one_markdown(Results(scenarios=(scenario.model_copy(update={"rows": rows}),)), [])
+    assert markdown.count("not scored (semi-metric, topometric): the truth is not known") == 1

@@ -8,13 +8,14 @@ from numpy.testing import assert_array_equal
 
 from hippodrome.core.mapping.mapper import MapperConfig, map_drive
 from hippodrome.core.types import HippodromeError, Observation
-from hippodrome.eval.rivals.orbslam3.stage import stereo_scenario
+from hippodrome.eval.rivals.orbslam3.method import OrbSlam3
 from hippodrome.eval.rivals.rows import (
     RatSlamMethod,
     map_without_attractor,
     run_ratslam,
     save_ratslam,
 )
+from hippodrome.eval.trials.rivals.stage import seen_as_needed
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.record import RecordingPlan, prepare
 from hippodrome.sim.scenario import DriveSpec, Scenario
@@ -65,7 +66,7 @@ def test_the_stereo_camera_sees_the_same_drive(tmp_path):
     town = TownSpec(kind="grid", width_m=150.0, height_m=150.0, road_km=0.9)
     drive = DriveSpec(tour=TourSpec(length_m=150.0), traffic=TrafficSpec(vehicles=2))
     scenario = Scenario(name="pair", seed=5, town=town, mapping=drive)
-    stereo = stereo_scenario(scenario)
+    stereo = seen_as_needed(scenario, OrbSlam3.needs)
     assert (stereo.camera.width, stereo.camera.rate_hz) == (640, scenario.odometry_rate_hz)
     assert stereo.camera.stereo_baseline_m == 0.5
     plans = [RecordingPlan(one, "mapping", tmp_path) for one in (scenario, stereo)]

@@ -14,9 +14,12 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from hippodrome._files import write_atomically
+from hippodrome.core.attractors.grid_cells import module_periods
+from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.types import CognitiveMap, FloatArray, IntArray, LocalizationEstimate, Trajectory
 from hippodrome.eval.methods.materials import Materials, Outcome
 from hippodrome.eval.methods.method import Method
+from hippodrome.eval.report.candidates import Look, looks_at
 from hippodrome.eval.report.evidence import (
     DECIMALS_M,
     JPEG_QUALITY,
@@ -28,6 +31,7 @@ from hippodrome.eval.report.evidence import (
     rounded,
     timed_columns,
     timed_path,
+    worst_places,
 )
 from hippodrome.eval.results.model import MAX_BYTES, ResultsError
 from hippodrome.sim.recording import Recording
@@ -42,6 +46,8 @@ SETTLING_STEP_S, STEP_S = (
 FRAMES: Final = 120  # thumbnails of the second drive, which is shorter than the first
 SETTLING_FRAMES: Final = 20  # of them in the first seconds: one a second
 UNKNOWN_M2: Final = 1e8  # variances above (10 km)^2 say "anywhere"
+WORST_STEPS: Final = 4  # that are shown
+APART_STEPS: Final = 10  # samples (5 s) between two of them at least
 DIGITS: Final = 4  # significant digits of what is drawn as activity
 
 
@@ -69,6 +75,10 @@ class SecondDrive(EvidenceModel):
     truth: TimedPath
     frames: Thumbnails
     beliefs: list[Belief]
+    looks: tuple[Look, ...] = ()  # at the worst moments of each
+    periods_m: tuple[
+        float, ...
+    ] = ()  # of the grid modules; empty where the localizer has none, or the file is of an older version
 
 
 def write_second_drive(materials: Materials, localized: Mapping[Method, Outcome]) -> None:
@@ -92,7 +102,15 @@ def write_second_drive(materials: Materials, localized: Mapping[Method, Outcome]
     ]
     _, jpeg = cv2.imencode(".jpg", sheet[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     write_atomically(materials.folder / SECOND_FRAMES, jpeg.tobytes())
-    content = SecondDrive(truth=timed_path(truth), frames=tiles, beliefs=beliefs)
+    config = materials.scenario.localizer
+    maps = {method.label: outcome.refined for method, outcome in localized.items() if outcome.refined is not None}
+    looks = tuple(
+        look
+        for belief in beliefs
+        if belief.name in maps
+        for look in looks_at(belief.name, [belief.t_s[i] for i in worst_steps(belief)], drive, truth, maps[belief.name], config)
+    )
+    content = SecondDrive(truth=timed_path(truth), frames=tiles, beliefs=beliefs, looks=looks, periods_m=_periods_m(config))
     write_atomically(materials.folder / BELIEF_JSON, f"{content.model_dump_json()}\n".encode())
 
 
@@ -142,6 +160,20 @@ def read_second_drive(path: Path) -> SecondDrive:
         if len({len(column) for column in columns}) != 1:
             raise ResultsError(f"{path}: the columns of '{belief.name}' do not fit together; run `hippodrome eval` again")
     return content
+
+
+def worst_steps(belief: Belief) -> list[int]:
+    """Samples with the largest errors among those that were declared localized."""
+    pairs = zip(belief.error_m, belief.localized, strict=True)
+    errors_m = [error if known and error is not None else float("nan") for error, known in pairs]
+    return worst_places(np.array(errors_m), WORST_STEPS, APART_STEPS)
+
+
+def _periods_m(config: LocalizerConfig) -> tuple[float, ...]:
+    """Periods of the grid modules of a localizer's mode; none for a mode without networks."""
+    if config.mode == "paper":
+        return (config.paper.period_m,)
+    return tuple(float(period) for period in module_periods(config.smallest_period_m)) if config.mode == "coupled" else ()
 
 
 def _steps(times_s: FloatArray) -> IntArray:

@@ -29,7 +29,10 @@ def second_drive():
         grid_rad=[[0.5] * 12] * VERTICES, grid_reliability=[[float(3 + step)] * 12 for step in range(VERTICES)],
     )  # fmt: skip
     tiles = {"t_s": [0.0, 30.0, 60.0], "columns": 2, "width": 16, "height": 12}
-    return SecondDrive.model_validate({"truth": path, "frames": tiles, "beliefs": [belief.model_dump()]})
+    views = [{"view_s": 30.0, "score": 4.5, "off_m": 0.5}, {"view_s": 0.0, "score": 2.0, "off_m": None}]
+    looks = [{"method": "topometric", "t_s": path["t_s"][FIX], "views": views}]
+    whole = {"truth": path, "frames": tiles, "beliefs": [belief.model_dump()], "looks": looks, "periods_m": (97.0, 131.0, 173.0)}
+    return SecondDrive.model_validate(whole)
 
 
 @pytest.fixture
@@ -60,6 +63,11 @@ def test_the_data_comes_back_as_it_was(report):
     found = [json.loads(text) for parent, text in page.texts if parent == "script" and text.startswith('{"')]
     assert [SecondDrive.model_validate(one) for one in found if "beliefs" in one] == [second_drive()]
     assert report.stat().st_size < LIMIT_BYTES
+
+
+def test_candidates_stand_below_the_worst_moments(report):
+    text = Page(report.read_text(encoding="utf-8")).text().replace("\N{NO-BREAK SPACE}", " ")
+    assert "this frame alone resembles: 30 s (score 4.5, 0.5 m off); 0 s (score 2.0, no truth)" in text
 
 
 def test_no_script_makes_markup_of_data(report):

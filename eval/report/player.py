@@ -46,7 +46,7 @@ def player(files: ScenarioFiles) -> Html | None:
         element("div", element("canvas", aria_hidden="true"), class_="chart", tabindex="0", role="slider",
                 aria_valuemin=0, aria_valuemax=1000, aria_valuenow=0,
                 aria_label="Place in the story; the curves are the errors in metres"),
-        _transport(bool(files.second and files.second.periods_m)),
+        _transport(bool(files.second and any(one.periods_m for one in files.second.beliefs))),
         class_="player", role="region", aria_label="The drive, playing",
     )  # fmt: skip
 

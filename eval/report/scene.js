@@ -161,13 +161,14 @@ function makeScene(canvas, story) {
 
   /** Where each grid module alone says that the car may be: the same place once a period, in each direction. */
   function drawModules(drive, i) {
-    const periods = story.second ? story.second.periods_m || [] : [], phases = drive.grid_rad ? drive.grid_rad[i] : [];
+    const periods = drive.periods_m || [], phases = drive.grid_rad ? drive.grid_rad[i] : [];
     if (phases.length !== 4 * periods.length) return;
     const [x0, y0, x1, y1] = bounds;
     periods.forEach((period, module) => {
-      if (!(Math.min(drive.grid_reliability[i][4 * module], drive.grid_reliability[i][4 * module + 1]) > INFORMED)) return;
+      const sure = drive.grid_reliability[i].slice(4 * module, 4 * module + 4), population = sure[0] >= sure[2] ? 0 : 1; // the surer one
+      if (!(Math.min(sure[2 * population], sure[2 * population + 1]) > INFORMED)) return;
       const places = [0, 1].map((axis) => {
-        const [low, high] = axis ? [y0, y1] : [x0, x1], offset = (phases[4 * module + axis] / (2 * Math.PI)) * period, found = [];
+        const [low, high] = axis ? [y0, y1] : [x0, x1], offset = (phases[4 * module + 2 * population + axis] / (2 * Math.PI)) * period, found = [];
         for (let at = offset + Math.ceil((low - offset) / period) * period; at <= high; at += period) found.push(at);
         return found;
       });
@@ -219,7 +220,7 @@ function makeScene(canvas, story) {
 
   function drawMoment(moment, name) {
     pen.lineJoin = "round";
-    const layer = story.refined.find((one) => one.name === name);
+    const layer = layerOf(story, name);
     if (moment.kind === "map") drawMapping(moment.t);
     else if (moment.kind === "roads") drawRoads(moment.t, layer);
     else drawSecond(moment.t, layer, secondDrive(story, name));

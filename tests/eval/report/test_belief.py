@@ -92,7 +92,7 @@ def written(tmp_path):
 def test_files_come_back_and_tiles_are_the_frames_of_their_times(written):
     content = read_second_drive(written / "belief.json")
     assert [one.name for one in content.beliefs] == ["topometric"]
-    assert content.periods_m == (97.0, 131.0, 173.0)
+    assert content.beliefs[0].periods_m == (97.0, 131.0, 173.0)
     tiles, sheet = content.frames, cv2.imread(str(written / "frames-second.jpg"))
     assert sheet.shape[1] == tiles.columns * tiles.width
     for place in (0, 7, len(tiles.t_s) - 1):

@@ -55,7 +55,7 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
         return scenario_result(materials, performance.rows, performance.outcomes)  # the pictures show frames and errors
     write_map_evidence(materials, scored, localized)
     write_second_drive(materials, localized)
-    write_why(materials.folder, localized)
+    write_why(materials.folder, localized, materials.roads)
     if task.figures:
         semi_metric = next((one.mapped.cognitive_map for one in performance.outcomes if one.method == SEMI_METRIC), None)
         draw_scenario(materials, semi_metric, scored, localized)

@@ -18,20 +18,26 @@ from hippodrome.eval.report.tables import scrolling
 BOARD: Final = "board.html"
 SORT: Final = """
 for (const table of document.querySelectorAll('table')) {
-  table.querySelectorAll('thead th').forEach((head, column) => head.addEventListener('click', () => {
-    const up = head.dataset.up = head.dataset.up === '1' ? '0' : '1';
+  const heads = [...table.querySelectorAll('thead th')];
+  heads.forEach((head, column) => head.querySelector('button').addEventListener('click', () => {
+    const up = head.getAttribute('aria-sort') !== 'ascending';
+    for (const other of heads) other.removeAttribute('aria-sort');
+    head.setAttribute('aria-sort', up ? 'ascending' : 'descending');
     const body = table.tBodies[0];
     const value = row => { const text = row.cells[column].dataset.value; return text === undefined ? null : text; };
     [...body.rows].sort((a, b) => {
       const one = value(a), other = value(b);
       if (one === null || other === null) return (one === null) - (other === null);
       const order = column ? one - other : one.localeCompare(other);
-      return up === '1' ? order : -order;
+      return up ? order : -order;
     }).forEach(row => body.append(row));
   }));
 }
 """
-STYLE: Final = "thead th{cursor:pointer} td details{text-align:left;white-space:normal;max-width:26rem} td small{display:block}"
+STYLE: Final = """
+td details { margin: 0; text-align: left; white-space: normal; max-width: 26rem; margin-left: auto; }
+td summary { margin-left: auto; } td small { display: block; }
+"""
 
 
 def write_board(folders: Sequence[Path], out: Path) -> Path:
@@ -71,7 +77,7 @@ def board_html(made: Sequence[Table], names: Sequence[str]) -> str:
 def _table(table: Table) -> Html:
     """Lines of one method that have different definitions are told apart by a number."""
     shown = [drive for drive in table.drives if any(drive in line for line in table.lines.values())]
-    head = element("tr", element("th", "Method", scope="col"), [_heading(drive, shown) for drive in shown])
+    head = element("tr", _sorter("Method", scope="col"), [_heading(drive, shown) for drive in shown])
     rows, count = [], dict[str, int]()
     several = {method for method, _ in table.lines if sum(other == method for other, _ in table.lines) > 1}
     for (method, definition), cells in table.lines.items():
@@ -85,7 +91,13 @@ def _table(table: Table) -> Html:
 def _heading(drive: Drive, shown: Sequence[Drive]) -> Html:
     """The scenario's name; with its hash where another drive has the same."""
     twice = sum(other.name == drive.name for other in shown) > 1
-    return element("th", drive.name, element("small", f" {drive.asked[:6]}") if twice else None, scope="col", title=drive.asked)
+    words = joined(drive.name, element("small", f" {drive.asked[:6]}") if twice else None)
+    return _sorter(words, scope="col", title=drive.asked)
+
+
+def _sorter(words: str | Html, **attributes: str) -> Html:
+    """A heading that sorts by its column, with the keyboard too."""
+    return element("th", element("button", words, type="button", class_="sort"), **attributes)
 
 
 def _cell(cell: Cell | None, definition: str) -> Html:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-from importlib.resources import files
 from typing import Final
 
 import cv2
@@ -15,6 +14,7 @@ from hippodrome.eval.real.drawing import drive_map
 from hippodrome.eval.real.drive import MAX_ROWS, NEXT, WORDS, Drive, marks, status_of
 from hippodrome.eval.real.findings_file import place_words
 from hippodrome.eval.report.markup import Html, element, joined
+from hippodrome.eval.report.pages import page
 from hippodrome.sim.recording import Recording
 
 FRAMES: Final = 6  # shown, evenly over the drive
@@ -46,33 +46,28 @@ STYLE: Final = """
 
 def drive_page(drive: Drive) -> str:
     """The page as HTML that fetches nothing. Raises HippodromeError if frames of the recording cannot be read."""
-    style = files("hippodrome.eval.report").joinpath("style.css").read_text(encoding="utf-8") + STYLE
-    head = element(
-        "head",
-        element("meta", charset="utf-8"),
-        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("title", f"{drive.name} on {drive.network}"),
-        element("style", Html(style)),
-    )
     tone = None if (status_of(drive) == MatchStatus.MATCHED).any() else "bad"
-    body = element(
-        "body",
-        element("header", element("h1", f"{drive.name} on {drive.network}"), element("p", _summary(drive), class_=tone)),
-        _tiles(drive),
-        element("h2", "The map"),
-        *drive_map(drive),
-        element("h2", "What could not be vouched for"),
-        _refused(drive),
-        element("h2", "Where the map seems wrong"),
-        _findings(drive),
-        element("h2", "Frames along the drive"),
-        _frames(drive),
-        element("h2", "Figures"),
-        _figures(drive.scores),
-        element("h2", "What the stages said"),
-        _said(drive),
-    )
-    return f"<!doctype html>\n{element('html', head, body, lang='en')}\n"
+    title = f"{drive.name} on {drive.network}"
+    body = [
+        element("header", element("h1", title), element("p", _summary(drive), class_=tone)),
+        element(
+            "main",
+            _tiles(drive),
+            element("h2", "The map"),
+            *drive_map(drive),
+            element("h2", "What could not be vouched for"),
+            _refused(drive),
+            element("h2", "Where the map seems wrong"),
+            _findings(drive),
+            element("h2", "Frames along the drive"),
+            _frames(drive),
+            element("h2", "Figures"),
+            _figures(drive.scores),
+            element("h2", "What the stages said"),
+            _said(drive),
+        ),
+    ]
+    return page(title, body, (), style=STYLE)
 
 
 def _summary(drive: Drive) -> str:

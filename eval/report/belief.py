@@ -6,6 +6,7 @@ The belief is sampled: often in the first seconds, in which the localizer finds 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -14,9 +15,13 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from hippodrome._files import write_atomically
+from hippodrome.core.attractors.grid_cells import module_periods
+from hippodrome.core.localization.config import LocalizerConfig
+from hippodrome.core.localization.localizer import Localizer
 from hippodrome.core.types import CognitiveMap, FloatArray, IntArray, LocalizationEstimate, Trajectory
 from hippodrome.eval.methods.materials import Materials, Outcome
-from hippodrome.eval.methods.method import Method
+from hippodrome.eval.methods.method import TOPOMETRIC, Method
+from hippodrome.eval.report.candidates import Look, looks_at
 from hippodrome.eval.report.evidence import (
     DECIMALS_M,
     JPEG_QUALITY,
@@ -28,10 +33,12 @@ from hippodrome.eval.report.evidence import (
     rounded,
     timed_columns,
     timed_path,
+    worst_places,
 )
 from hippodrome.eval.results.model import MAX_BYTES, ResultsError
 from hippodrome.sim.recording import Recording
 
+AS_PRINTED: Final = "topometric, networks as printed"
 BELIEF_JSON: Final = "belief.json"
 SECOND_FRAMES: Final = "frames-second.jpg"
 SETTLING_S: Final = 20.0  # the initial localization of the paper takes less; in it the belief changes from step to step
@@ -42,6 +49,8 @@ SETTLING_STEP_S, STEP_S = (
 FRAMES: Final = 120  # thumbnails of the second drive, which is shorter than the first
 SETTLING_FRAMES: Final = 20  # of them in the first seconds: one a second
 UNKNOWN_M2: Final = 1e8  # variances above (10 km)^2 say "anywhere"
+WORST_STEPS: Final = 4  # that are shown
+APART_STEPS: Final = 10  # samples (5 s) between two of them at least
 DIGITS: Final = 4  # significant digits of what is drawn as activity
 
 
@@ -61,6 +70,8 @@ class Belief(TimedPath):
     head_reliability: list[list[float]]
     grid_rad: list[list[float]]  # (modules x 2 populations x 2 axes,) per sample
     grid_reliability: list[list[float]]
+    periods_m: tuple[float, ...] = ()  # of the grid modules; empty where there are none, or the file is an older one
+    map: str | None = None  # label of the method whose map it was localized in, where that is not ``name``
 
 
 class SecondDrive(EvidenceModel):
@@ -69,6 +80,7 @@ class SecondDrive(EvidenceModel):
     truth: TimedPath
     frames: Thumbnails
     beliefs: list[Belief]
+    looks: tuple[Look, ...] = ()  # at the worst moments of each
 
 
 def write_second_drive(materials: Materials, localized: Mapping[Method, Outcome]) -> None:
@@ -85,18 +97,35 @@ def write_second_drive(materials: Materials, localized: Mapping[Method, Outcome]
     sheet, columns = frame_sheet(drive, frames)
     height = sheet.shape[0] // -(-len(frames) // columns)
     tiles = Thumbnails(t_s=rounded(frame_times_s(drive)[frames]), columns=columns, width=sheet.shape[1] // columns, height=height)
+    config = materials.scenario.localizer
     beliefs = [
-        belief_of(method.label, outcome.localization.estimates, truth, outcome.refined)
+        belief_of(method.label, outcome.localization.estimates, truth, outcome.refined, _periods_m(config))
         for method, outcome in localized.items()
         if outcome.localization is not None and outcome.localization.estimates
     ]
+    if (printed := _as_printed(materials, localized)) is not None:
+        beliefs.insert(0, printed)  # the page shows the last one first
     _, jpeg = cv2.imencode(".jpg", sheet[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     write_atomically(materials.folder / SECOND_FRAMES, jpeg.tobytes())
-    content = SecondDrive(truth=timed_path(truth), frames=tiles, beliefs=beliefs)
+    maps = {method.label: outcome.refined for method, outcome in localized.items() if outcome.refined is not None}
+    looks = tuple(
+        look
+        for belief in beliefs
+        if belief.name in maps
+        for look in looks_at(belief.name, [belief.t_s[i] for i in worst_steps(belief)], drive, truth, maps[belief.name], config)
+    )
+    content = SecondDrive(truth=timed_path(truth), frames=tiles, beliefs=beliefs, looks=looks)
     write_atomically(materials.folder / BELIEF_JSON, f"{content.model_dump_json()}\n".encode())
 
 
-def belief_of(name: str, estimates: list[LocalizationEstimate], truth: Trajectory, cognitive_map: CognitiveMap | None) -> Belief:
+def belief_of(
+    name: str,
+    estimates: list[LocalizationEstimate],
+    truth: Trajectory,
+    cognitive_map: CognitiveMap | None,
+    periods_m: tuple[float, ...] = (),
+    map_of: str | None = None,
+) -> Belief:
     """The samples of one localizer's estimates.
 
     Args:
@@ -104,6 +133,8 @@ def belief_of(name: str, estimates: list[LocalizationEstimate], truth: Trajector
         estimates: One per observation, at least one.
         truth: The drive's true trajectory; it may lack some of the times.
         cognitive_map: The map that it was localized in; None if it is not one of our kind, and then no view is named.
+        periods_m: Periods of the localizer's grid modules.
+        map_of: Label of the method whose map it is, where that is not ``name``.
     """
     times_s = np.array([one.t_s for one in estimates])
     chosen = [estimates[step] for step in _steps(times_s)]
@@ -125,6 +156,8 @@ def belief_of(name: str, estimates: list[LocalizationEstimate], truth: Trajector
         head_reliability=[_significant(one.head_reliability) for one in chosen],
         grid_rad=[_significant(np.ravel(one.grid_phase_rad)) for one in chosen],
         grid_reliability=[_significant(np.ravel(one.grid_reliability)) for one in chosen],
+        periods_m=periods_m if all(4 * len(periods_m) == np.size(one.grid_phase_rad) for one in chosen) else (),
+        map=map_of,
     )
 
 
@@ -142,6 +175,36 @@ def read_second_drive(path: Path) -> SecondDrive:
         if len({len(column) for column in columns}) != 1:
             raise ResultsError(f"{path}: the columns of '{belief.name}' do not fit together; run `hippodrome eval` again")
     return content
+
+
+def _as_printed(materials: Materials, localized: Mapping[Method, Outcome]) -> Belief | None:
+    """The belief of the networks as the paper prints them, in our map, so that what they do and where they fail is seen.
+
+    None where the scenario's localizer is in that mode itself, or nothing was localized in our map. It has no row: no figure of
+    the results depends on it.
+    """
+    config, outcome = materials.scenario.localizer, localized.get(TOPOMETRIC)
+    if outcome is None or not isinstance(outcome.refined, CognitiveMap) or config.mode == "paper":
+        return None
+    printed = replace(config, mode="paper")
+    localizer = Localizer(outcome.refined, materials.roads, printed)
+    estimates = [localizer.step(observation) for observation in materials.drive.observations()]
+    truth = materials.drive.ground_truth()
+    return belief_of(AS_PRINTED, estimates, truth, outcome.refined, _periods_m(printed), TOPOMETRIC.label)
+
+
+def worst_steps(belief: Belief) -> list[int]:
+    """Samples with the largest errors among those that were declared localized."""
+    pairs = zip(belief.error_m, belief.localized, strict=True)
+    errors_m = [error if known and error is not None else float("nan") for error, known in pairs]
+    return worst_places(np.array(errors_m), WORST_STEPS, APART_STEPS)
+
+
+def _periods_m(config: LocalizerConfig) -> tuple[float, ...]:
+    """Periods of the grid modules of a localizer's mode; none for a mode without networks."""
+    if config.mode == "paper":
+        return (config.paper.period_m,)
+    return tuple(float(period) for period in module_periods(config.smallest_period_m)) if config.mode == "coupled" else ()
 
 
 def _steps(times_s: FloatArray) -> IntArray:

@@ -83,7 +83,7 @@ function makeChart(canvas, story) {
 
   /** Error curves: the semi-metric map and the refined one along the first drive, the localizer along the second. */
   function curves() {
-    const layers = [story.semi, story.refined.find((one) => one.name === name)].filter(Boolean), drive = secondDrive(story, name);
+    const layers = [story.semi, layerOf(story, name)].filter(Boolean), drive = secondDrive(story, name);
     const first = layers.map((path) => ({ path, drive: 1, colour: story.colours[path.name] }));
     return drive ? [...first, { path: drive, drive: 2, colour: story.colours[name] }] : first;
   }

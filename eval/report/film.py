@@ -74,12 +74,13 @@ def _read(folder: Path) -> Story:
     if missing or TOPOMETRIC.label not in beliefs:
         raise HippodromeError(f"{folder}: no map '{(missing or [TOPOMETRIC.label])[0]}', for it failed; choose another scenario")
     sheets = [cv2.imread(str(folder / file)) for file in (THUMBNAILS, SECOND_FRAMES)]
-    if any(sheet is None for sheet in sheets):
+    first, second_sheet = sheets
+    if first is None or second_sheet is None:
         raise HippodromeError(f"{folder}: no frames to show; run `hippodrome eval` again")
     semi, refined = layers[SEMI_METRIC.label], layers[TOPOMETRIC.label]
     if len(semi.t_s) != len(refined.t_s):
         raise HippodromeError(f"{folder}: the two maps have not the same vertices; choose another scenario")
-    return Story(evidence, second, semi, refined, beliefs[TOPOMETRIC.label], (sheets[0][:, :, ::-1], sheets[1][:, :, ::-1]))
+    return Story(evidence, second, semi, refined, beliefs[TOPOMETRIC.label], (first[:, :, ::-1], second_sheet[:, :, ::-1]))
 
 
 def _pictures(story: Story) -> Iterator[Any]:
@@ -189,7 +190,8 @@ class _Stage:
         return self._screen(np.array([x_m[:count], y_m[:count]]).T.reshape(-1, 2))
 
     def _at(self, times_s: list[float], x_m: list[float], y_m: list[float], t_s: float) -> FloatArray:
-        return self._screen(np.array([[np.interp(t_s, times_s, x_m), np.interp(t_s, times_s, y_m)]]))[0]
+        place: FloatArray = self._screen(np.array([[np.interp(t_s, times_s, x_m), np.interp(t_s, times_s, y_m)]]))[0]
+        return place
 
     def _line(self, pen: Any, places: FloatArray, tone: str, width: float) -> None:
         if len(places) > 1:

@@ -26,7 +26,9 @@ def asset(name: str) -> str:
     return (files("hippodrome.eval.report") / name).read_text(encoding="utf-8")
 
 
-def page(title: str, body: Sequence[Child], scripts: Sequence[str], early: str | None = None, policy: str = POLICY) -> str:
+def page(
+    title: str, body: Sequence[Child], scripts: Sequence[str], early: str | None = None, policy: str = POLICY, style: str = ""
+) -> str:
     """A whole document.
 
     Args:
@@ -35,6 +37,7 @@ def page(title: str, body: Sequence[Child], scripts: Sequence[str], early: str |
         scripts: Names of the scripts, each of which uses those before it.
         early: A script that runs before anything is shown.
         policy: Where the page may load from.
+        style: Style of this page alone.
     """
     head = element(
         "head",
@@ -44,9 +47,10 @@ def page(title: str, body: Sequence[Child], scripts: Sequence[str], early: str |
         element("meta", name="color-scheme", content="light dark"),
         element("title", title),
         element("script", Html(early)) if early else None,
-        element("style", Html(asset("style.css"))),
+        element("style", Html(asset("style.css") + style)),
     )
-    dialog = element("dialog", element("button", element("img", alt=""), type="button", aria_label="Close"))
+    enlarged = element("dialog", element("button", element("img", alt=""), type="button", aria_label="Close"))
+    dialog = enlarged if scripts else None
     script = element("script", Html("\n".join(asset(name) for name in scripts))) if scripts else None
     return "<!doctype html>\n" + element("html", head, element("body", *body, dialog, script), lang="en") + "\n"
 

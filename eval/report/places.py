@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from typing import Final
 from urllib.parse import quote
 
-import numpy as np
-
 from hippodrome.eval.methods.method import method_of
-from hippodrome.eval.report.belief import Belief
-from hippodrome.eval.report.evidence import Layer, MapEvidence, Thumbnails, worst_places
+from hippodrome.eval.report.belief import Belief, worst_steps
+from hippodrome.eval.report.candidates import ViewCandidate
+from hippodrome.eval.report.evidence import Layer, MapEvidence, Thumbnails
 from hippodrome.eval.report.files import ScenarioFiles
 from hippodrome.eval.report.markup import Html, element, joined
 from hippodrome.eval.report.why import WITHIN_95, Place
 
 FRAME_LABEL: Final = "camera frame at {:.0f} s"
-WORST_STEPS: Final = 4  # of the second drive that are shown
-APART_STEPS: Final = 10  # samples (5 s) between two of them at least
 NBSP: Final = "\N{NO-BREAK SPACE}"
 
 
@@ -42,7 +39,7 @@ def localization_places(files: ScenarioFiles, town: str) -> Html | None:
     groups = [
         element("div", element("h4", f"{belief.name}, second drive"), element("div", cards, class_="cards pairs"))
         for belief in files.second.beliefs
-        if (cards := [_step(belief, step, files.second.frames, files.evidence, town, files) for step in _worst_steps(belief)])
+        if (cards := [_step(belief, step, files.second.frames, files.evidence, town, files) for step in worst_steps(belief)])
     ]
     return joined(groups) if groups else None
 
@@ -70,14 +67,9 @@ def _vertex_facts(place: Place) -> list[str]:
         facts.append(f"{place.since_closure_m:.0f}{NBSP}m since a loop was closed (view of {place.closed_with_s:.0f}{NBSP}s)")
     near = [f"{one.apart_m:.1f}{NBSP}m away, {'no truth' if one.error_m is None else f'{one.error_m:.2f}{NBSP}m off'}"
             for one in place.neighbours]  # fmt: skip
+    if place.lanes:
+        facts.append(f"other lanes: {'; '.join(f'{one.lane}, {one.apart_m:.1f}{NBSP}m away' for one in place.lanes)}")
     return [*facts, f"other passes: {'; '.join(near)}" if near else "no other pass of this street"]
-
-
-def _worst_steps(belief: Belief) -> list[int]:
-    """Samples with the largest errors among those that were declared localized."""
-    pairs = zip(belief.error_m, belief.localized, strict=True)
-    errors_m = [error if known and error is not None else float("nan") for error, known in pairs]
-    return worst_places(np.array(errors_m), WORST_STEPS, APART_STEPS)
 
 
 def _step(belief: Belief, step: int, frames: Thumbnails, evidence: MapEvidence, town: str, files: ScenarioFiles) -> Html:
@@ -89,9 +81,18 @@ def _step(belief: Belief, step: int, frames: Thumbnails, evidence: MapEvidence, 
         f"margin of the last view: {belief.confidence[step]:.2f}",
         "no view has fired yet" if view_s is None else f"right: view of {view_s:.0f}{NBSP}s, the kept frame nearest to it",
     ]
+    looks = files.second.looks if files.second else ()
+    if views := next((look.views for look in looks if (look.method, look.t_s) == (belief.name, t_s)), None):
+        facts.append(f"this frame alone resembles: {'; '.join(map(_resemblance, views))}")
     words = joined(element("strong", f"{belief.error_m[step] or 0.0:.2f}{NBSP}m"), element("small", f"{t_s:.0f}{NBSP}s"))
     pictures = element("div", seen, fired, class_="pair")
     return element("div", element("div", pictures, words, class_="card"), _list(facts), _link(town, 2, t_s), class_="place")
+
+
+def _resemblance(view: ViewCandidate) -> str:
+    """A candidate: when it was stored, its score, and how far from the car it lies."""
+    off = "no truth" if view.off_m is None else f"{view.off_m:.1f}{NBSP}m off"
+    return f"{view.view_s:.0f}{NBSP}s (score {view.score:.1f}, {off})"
 
 
 def _sure_m(covariance_m2: tuple[float, float, float]) -> float:

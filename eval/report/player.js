@@ -154,6 +154,9 @@ function startPlayer(root) {
     if (story.semi) find(".mark.own").style.background = story.colours[story.semi.name];
     select.closest("label").hidden = story.choices.length < 2;
     select.addEventListener("change", () => choose(select.value));
+    const modules = find("input.modules");
+    if (modules) modules.addEventListener("change", () => { showModules.on = modules.checked; redraw(); });
+    if (!modules) find(".mark.modules").parentElement.remove();
     find(".play").addEventListener("click", () => play(!playing));
     for (const button of root.querySelectorAll("[data-part]")) button.addEventListener("click", () => {
       const part = segments.find((one) => one.kind === button.dataset.part) || segments.find((one) => partOf(one.kind) === button.dataset.part);

@@ -17,11 +17,12 @@ MARKS = (  # sign, meaning, and the parts of the story in which it is seen
     ("ramp", "on the roads: error 0.1 to 100 m", "roads"),
     ("fix", "belief (95 %)", "find"),
     ("view", "view that fired", "find"),
+    ("modules", "places of each grid module alone", "find"),
 )
 BRAIN_PARTS = (  # equations are those of Li et al. 2025
     ("Head-direction ring:", "each cell stands for a heading, and the cells around the believed one are active, Eq. (1)."),
     ("Grid sheets:", "each cell stands for a place within a period that repeats over the town, Eq. (2); modules of unequal "
-                     "periods together tell one place, the arrow on the map, Eqs. (15) and (16)."),
+                     "periods together tell one place, where their signs on the map meet, Eqs. (15) and (16)."),
     ("Integrator cells (blue):", "move the bump by what wheels and gyro say, and slowly lose certainty."),
     ("Calibration cells (orange):", "take the pose of a recognised view in, an injection, Eqs. (13) and (14)."),
     ("Inhibition:", "keeps the activity of a network limited, Eqs. (3) to (5), and lets its two populations compete, "
@@ -45,7 +46,7 @@ def player(files: ScenarioFiles) -> Html | None:
         element("div", element("canvas", aria_hidden="true"), class_="chart", tabindex="0", role="slider",
                 aria_valuemin=0, aria_valuemax=1000, aria_valuenow=0,
                 aria_label="Place in the story; the curves are the errors in metres"),
-        _transport(),
+        _transport(bool(files.second and any(one.periods_m for one in files.second.beliefs))),
         class_="player", role="region", aria_label="The drive, playing",
     )  # fmt: skip
 
@@ -124,7 +125,7 @@ def _brain() -> Html:
         for number in range(1, MODULES + 1)
     ]  # fmt: skip
     ring = element(
-        "figure", element("canvas", class_="ring", role="img", aria_label="Head-direction ring"), element("figcaption", "heading")
+        "figure", element("canvas", class_="ring", role="img", aria_label="Head-direction ring"), element("figcaption", "head")
     )
     colours = element("p", element("b", "integrator", class_="integrator"), " cells follow wheels and gyro, ",
                       element("b", "calibration", class_="calibration"), " cells the views; both on a log scale. ",
@@ -132,7 +133,7 @@ def _brain() -> Html:
     return element("div", element("div", ring, sheets, class_="networks"), colours, class_="brain")
 
 
-def _transport() -> Html:
+def _transport(has_modules: bool) -> Html:
     parts = [element("button", words, type="button", data_part=kind, aria_pressed="false") for kind, words in PARTS]
     speeds = [element("option", words, value=value, selected=value == "1") for value, words in SPEEDS]
     return element(
@@ -141,5 +142,8 @@ def _transport() -> Html:
         parts,
         element("select", speeds, class_="speed", aria_label="Speed"),
         element("label", "Map ", element("select", class_="choice")),
+        element("label", element("input", type="checkbox", checked=True, class_="modules"), " grid modules")
+        if has_modules
+        else None,
         class_="transport",
     )

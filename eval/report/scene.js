@@ -1,6 +1,9 @@
 // The player's map: one moment of a story, drawn. Roads and truth are drawn once per view and copied afterwards.
 
 const HEAD_PX = 62, FOOT_PX = 24; // above and below a large map, for its words and its legend
+const MODULE_COLOURS = ["#cc79a7", "#0072b2", "#d55e00"]; // of the grid modules' places
+const INFORMED = 5; // reliability in 1/rad^2 below which a module's phase means nothing
+const showModules = { on: true };
 const ANYWHERE_M = 150; // half axis of a belief that covers a town: drawn as a veil over all of it
 
 function storyBounds(story) {
@@ -152,7 +155,37 @@ function makeScene(canvas, story) {
       pen.strokeRect(X(view_m[0]) - 6, Y(view_m[1]) - 6, 12, 12);
     }
     if (truth && truth.t_s.length) disc(...placeAt(truth, t), 5, inks.truth, inks.paper);
+    if (showModules.on) drawModules(drive, i);
     if (known) arrow(drive, i, placeAt(drive, t), colour);
+  }
+
+  /** Where each grid module alone says that the car may be: the same place once a period, in each direction. */
+  function drawModules(drive, i) {
+    const periods = drive.periods_m || [], phases = drive.grid_rad ? drive.grid_rad[i] : [];
+    if (phases.length !== 4 * periods.length) return;
+    const [x0, y0, x1, y1] = bounds;
+    periods.forEach((period, module) => {
+      const sure = drive.grid_reliability[i].slice(4 * module, 4 * module + 4), population = sure[0] >= sure[2] ? 0 : 1; // the surer one
+      if (!(Math.min(sure[2 * population], sure[2 * population + 1]) > INFORMED)) return;
+      const places = [0, 1].map((axis) => {
+        const [low, high] = axis ? [y0, y1] : [x0, x1], offset = (phases[4 * module + 2 * population + axis] / (2 * Math.PI)) * period, found = [];
+        for (let at = offset + Math.ceil((low - offset) / period) * period; at <= high; at += period) found.push(at);
+        return found;
+      });
+      pen.strokeStyle = MODULE_COLOURS[module % MODULE_COLOURS.length];
+      pen.lineWidth = 1.8;
+      pen.beginPath();
+      for (const x of places[0]) for (const y of places[1]) outline(X(x), Y(y), module, 6 + 3 * module);
+      pen.stroke();
+    });
+  }
+
+  /** A sign of its own for each module: square, diamond, circle, so that colours are not needed to tell them apart. */
+  function outline(x, y, module, size) {
+    if (module > 1) { pen.moveTo(x + size, y); pen.arc(x, y, size, 0, 2 * Math.PI); return; }
+    const corners = module ? [[0, -1], [1, 0], [0, 1], [-1, 0]] : [[-0.8, -0.8], [0.8, -0.8], [0.8, 0.8], [-0.8, 0.8]];
+    corners.forEach(([u, v], k) => pen[k ? "lineTo" : "moveTo"](x + size * u, y + size * v));
+    pen.closePath();
   }
 
   function drawEllipse([x, y], { a, b, turn }, colour) {
@@ -187,7 +220,7 @@ function makeScene(canvas, story) {
 
   function drawMoment(moment, name) {
     pen.lineJoin = "round";
-    const layer = story.refined.find((one) => one.name === name);
+    const layer = layerOf(story, name);
     if (moment.kind === "map") drawMapping(moment.t);
     else if (moment.kind === "roads") drawRoads(moment.t, layer);
     else drawSecond(moment.t, layer, secondDrive(story, name));

@@ -10,7 +10,17 @@ function makeStory(data, second) {
   const colours = Object.fromEntries(data.methods.map((layer, i) => [layer.name, COLOURS[i % COLOURS.length]]));
   const semi = data.methods.find((layer) => layer.name === "semi-metric") || null;
   const refined = data.methods.filter((layer) => names.has(layer.name));
-  return { data, second, colours, semi, refined, choices: refined.map((layer) => layer.name) };
+  // A second localizer may have driven in the map of a method: it is a choice beside that one.
+  const others = (second ? second.beliefs : []).filter((one) => one.map && refined.some((layer) => layer.name === one.map));
+  for (const one of others) colours[one.name] = COLOURS[5];
+  const choices = [...others.map((one) => one.name), ...refined.map((layer) => layer.name)];
+  return { data, second, colours, semi, refined, choices };
+}
+
+/** The map that is shown with a choice. */
+function layerOf(story, name) {
+  const belief = story.second && story.second.beliefs.find((one) => one.name === name);
+  return story.refined.find((one) => one.name === ((belief && belief.map) || name));
 }
 
 /** The segments of a story for one of its refined maps: story seconds s0..s1 stand for seconds t0..t1 of a drive. */

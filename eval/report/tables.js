@@ -49,7 +49,7 @@ function meaningOf(table, text) {
   const name = text.replace(/ (median|p95|max)\b/, "").replace(/ \((m|m driven|ms|%)\)$/, ""), section = table.closest("section");
   const aliases = { Error: "localization", "Error p95": "localization", "First fix": "localization", Localized: "localization" };
   const wanted = (aliases[name] || name).toLowerCase();
-  return [...section.querySelectorAll(".definitions li")].map(textOf).filter((line) => line.toLowerCase().startsWith(`${wanted} (`)).join("; ");
+  return [...(section ? section.querySelectorAll(".definitions li") : [])].map(textOf).filter((line) => line.toLowerCase().startsWith(`${wanted} (`)).join("; ");
 }
 
 function sortable(table, heads, said) {

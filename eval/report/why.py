@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from hippodrome._files import write_atomically
+from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, EdgeKind, FloatArray, MatchStatus
 from hippodrome.eval.methods.materials import Outcome
 from hippodrome.eval.methods.method import Method
+from hippodrome.eval.report.candidates import LaneCandidate, lanes_beside
 from hippodrome.eval.report.evidence import DECIMALS_M, MAP_JSON, EvidenceModel, Layer, read_map_evidence
 from hippodrome.eval.results.model import MAX_BYTES, ResultsError
 
@@ -44,6 +46,7 @@ class Place(EvidenceModel):
     since_closure_m: float | None  # driven since the last loop closure; None if there was none before
     closed_with_s: float | None  # when the place of that closure had been stored
     neighbours: list[Neighbour]
+    lanes: tuple[LaneCandidate, ...] = ()  # that it might have been matched to as well
 
 
 class Places(EvidenceModel):
@@ -52,11 +55,11 @@ class Places(EvidenceModel):
     places: list[Place]
 
 
-def write_why(folder: Path, localized: Mapping[Method, Outcome]) -> None:
+def write_why(folder: Path, localized: Mapping[Method, Outcome], roads: RoadNetwork | None = None) -> None:
     """Write what the refined maps say of the worst places that ``map.json`` in a scenario's folder names."""
     maps = {method.label: outcome.refined for method, outcome in localized.items() if outcome.refined is not None}
     layers = [layer for layer in read_map_evidence(folder / MAP_JSON).methods if layer.name in maps]
-    places = [place_of(layer, vertex, maps[layer.name]) for layer in layers for vertex in layer.worst]
+    places = [place_of(layer, vertex, maps[layer.name], roads) for layer in layers for vertex in layer.worst]
     write_atomically(folder / WHY_JSON, f"{Places(places=places).model_dump_json()}\n".encode())
 
 
@@ -71,13 +74,14 @@ def read_why(path: Path) -> Places:
         raise ResultsError(f"{path}: not readable: {reason}; run `hippodrome eval` again") from error
 
 
-def place_of(layer: Layer, vertex: int, cognitive_map: CognitiveMap) -> Place:
+def place_of(layer: Layer, vertex: int, cognitive_map: CognitiveMap, roads: RoadNetwork | None = None) -> Place:
     """What a refined map says of one vertex.
 
     Args:
         layer: The method's vertices with their errors, as many as the map's.
         vertex: Number of the vertex.
         cognitive_map: The refined map.
+        roads: The network that it was refined with, whose lanes nearby are named.
     """
     match = cognitive_map.road_match
     lane = int(match.lane[vertex]) if match is not None else -1
@@ -93,6 +97,7 @@ def place_of(layer: Layer, vertex: int, cognitive_map: CognitiveMap) -> Place:
         since_closure_m=None if last is None else _driven_m(cognitive_map.poses[last : vertex + 1]),
         closed_with_s=None if last is None else _partner_s(cognitive_map, last),
         neighbours=_neighbours(layer, vertex, cognitive_map.poses),
+        lanes=() if roads is None else lanes_beside(cognitive_map.poses[vertex, :2], roads, lane),
     )
 
 

@@ -119,3 +119,15 @@ def test_help_waits_for_no_simulator():
     code = f"from hippodrome.eval.cli import make_parser; import sys; make_parser(); print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("command", ["eval", "render", "stress", "robustness", "sweep"])
+def test_faults_of_a_scenario_are_said_as_validate_says_them_all_at_once(command, tmp_path, capsys):
+    path = tmp_path / "broken.yaml"
+    path.write_text("name: broken\nseeed: 3\ncamera: {rate_hz: fast}\n")
+    said = []
+    for words in (["scenario", "validate"], [command]):
+        assert main([*words, str(path), *(["--out", str(tmp_path / "out")] if words == [command] else [])]) == BAD_INPUT
+        said.append(capsys.readouterr().err)
+    assert said[0] == said[1]
+    assert "did you mean seed?" in said[0] and "rate_hz" in said[0] and len(said[0].splitlines()) >= 2

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.types import LocalizationEstimate, LocalizationStatus, Trajectory
 from hippodrome.eval.methods.method import TOPOMETRIC
 from hippodrome.eval.report.belief import (
@@ -44,6 +45,7 @@ COGNITIVE_MAP = SimpleNamespace(
     t_s=np.array([1.0, 2.0, 3.0]),
     poses=np.array([[5.0, 6.0, 0.0], [7.0, 8.0, 0.0], [9.0, 9.0, 0.0]]),
     view_cell=np.array([1, 0, 0]),
+    view_cells=SimpleNamespace(templates=[]),
 )
 
 
@@ -82,13 +84,15 @@ def written(tmp_path):
     outcome = SimpleNamespace(
         localization=SimpleNamespace(estimates=[estimate(step) for step in range(STEPS)]), refined=COGNITIVE_MAP
     )
-    write_second_drive(SimpleNamespace(folder=tmp_path, drive=drive), {TOPOMETRIC: outcome})
+    scenario = SimpleNamespace(localizer=LocalizerConfig())
+    write_second_drive(SimpleNamespace(folder=tmp_path, drive=drive, scenario=scenario), {TOPOMETRIC: outcome})
     return tmp_path
 
 
 def test_files_come_back_and_tiles_are_the_frames_of_their_times(written):
     content = read_second_drive(written / "belief.json")
     assert [one.name for one in content.beliefs] == ["topometric"]
+    assert content.beliefs[0].periods_m == (97.0, 131.0, 173.0)
     tiles, sheet = content.frames, cv2.imread(str(written / "frames-second.jpg"))
     assert sheet.shape[1] == tiles.columns * tiles.width
     for place in (0, 7, len(tiles.t_s) - 1):

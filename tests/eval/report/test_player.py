@@ -20,7 +20,7 @@ def second_drive():
     path = evidence().truth.model_dump()
     known = [step >= FIX for step in range(VERTICES)]
     belief = Belief(
-        name="topometric", **path, heading_rad=[0.1] * VERTICES,
+        name="topometric", periods_m=(97.0, 131.0, 173.0), **path, heading_rad=[0.1] * VERTICES,
         covariance_m2=[(1.0, 0.2, 2.0) if now else (1e6, 0.0, 1e6) for now in known],
         error_m=[1.5 if now else 80.0 for now in known], localized=known,
         status=[int(now) for now in known], confidence=[2.0] * VERTICES,
@@ -29,7 +29,10 @@ def second_drive():
         grid_rad=[[0.5] * 12] * VERTICES, grid_reliability=[[float(3 + step)] * 12 for step in range(VERTICES)],
     )  # fmt: skip
     tiles = {"t_s": [0.0, 30.0, 60.0], "columns": 2, "width": 16, "height": 12}
-    return SecondDrive.model_validate({"truth": path, "frames": tiles, "beliefs": [belief.model_dump()]})
+    views = [{"view_s": 30.0, "score": 4.5, "off_m": 0.5}, {"view_s": 0.0, "score": 2.0, "off_m": None}]
+    looks = [{"method": "topometric", "t_s": path["t_s"][FIX], "views": views}]
+    whole = {"truth": path, "frames": tiles, "beliefs": [belief.model_dump()], "looks": looks}
+    return SecondDrive.model_validate(whole)
 
 
 @pytest.fixture
@@ -60,6 +63,25 @@ def test_the_data_comes_back_as_it_was(report):
     found = [json.loads(text) for parent, text in page.texts if parent == "script" and text.startswith('{"')]
     assert [SecondDrive.model_validate(one) for one in found if "beliefs" in one] == [second_drive()]
     assert report.stat().st_size < LIMIT_BYTES
+
+
+def test_a_belief_in_the_map_of_another_method_is_a_choice_of_its_own(browser, report):
+    content = second_drive()
+    printed = content.beliefs[0].model_copy(update={"name": "as printed", "map": "topometric", "error_m": [7.0] * VERTICES})
+    both = content.model_copy(update={"beliefs": [printed, *content.beliefs]})
+    (report.parent / "town & co" / "belief.json").write_text(both.model_dump_json())
+    script = """const choice = panel.querySelector(".choice"), words = () => panel.querySelector(".moment").textContent;
+        say("choices", [...choice.options].map((one) => one.value).join("|")); say("first", words());
+        choice.value = "as printed"; choice.dispatchEvent(new Event("change")); await wait(); say("then", words());"""
+    said, console = after(browser, write_report(report.parent), script, "town=town%20%26%20co&drive=2&t=40")
+    assert console == []
+    assert said["choices"].split("|") == ["as printed", "topometric"]
+    assert "truly 1.50 m off" in said["first"] and "truly 7.00 m off" in said["then"]
+
+
+def test_candidates_stand_below_the_worst_moments(report):
+    text = Page(report.read_text(encoding="utf-8")).text().replace("\N{NO-BREAK SPACE}", " ")
+    assert "this frame alone resembles: 30 s (score 4.5, 0.5 m off); 0 s (score 2.0, no truth)" in text
 
 
 def test_no_script_makes_markup_of_data(report):

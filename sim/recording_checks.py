@@ -22,6 +22,7 @@ PNG_HEAD: Final = struct.Struct(">8s4x4sII")  # signature, length and name of th
 MOST: Final = {
     "t_s": 1e11, "dt_s": 3600.0, "speed": 1e6, "yaw_rate_radps": 1e4, "poses_m": 1e9, "speed_mps": 1e4, "lane_position_m": 1e7,
 }  # fmt: skip
+TIMES_AGREE_S: Final = 0.5  # and half of a step: what a step lasts and when it ends are told twice, and only one may be believed
 CHECKSUM: Final = "manifest_sha256"  # of all else in a manifest; recordings of before it was written have none
 TRUTH: Final = ("poses_m", "speed_mps", "lane_position_m")  # nan where it is unknown
 
@@ -46,6 +47,8 @@ def check_samples(arrays: Mapping[str, np.ndarray[Any, Any]], most_steps: int) -
         _require((np.abs(arrays[name].astype(np.float64)) <= most) | unknown, name, f"not finite, or beyond {most:g}")
     _require(arrays["dt_s"] > 0.0, "dt_s", "not above zero")
     _require(np.diff(arrays["t_s"]) > 0.0, "t_s", "followed by an earlier or the same one")
+    between_s, lasts_s = np.diff(arrays["t_s"].astype(np.float64)), arrays["dt_s"][1:].astype(np.float64)
+    _require(np.abs(between_s - lasts_s) <= TIMES_AGREE_S + 0.5 * lasts_s, "dt_s", "not the time since the step before", 1)
     lanes = len(arrays["lane_ids"])
     _require((arrays["lane"] >= -1) & (arrays["lane"] < max(lanes, 1)), "lane", f"none of {lanes} lanes")
     numbers = arrays["frame"]
@@ -102,7 +105,8 @@ def decoded_png(blob: bytes) -> Frame:
     return np.ascontiguousarray(image[:, :, ::-1], dtype=np.uint8)
 
 
-def _require(holds: np.ndarray[Any, Any], name: str, complaint: str) -> None:
+def _require(holds: np.ndarray[Any, Any], name: str, complaint: str, first: int = 0) -> None:
+    """Raise ValueError unless all hold; ``first`` is the row of the first of them."""
     if not holds.all():
-        row = int(np.argwhere(~holds)[0][0])
+        row = int(np.argwhere(~holds)[0][0]) + first
         raise ValueError(f"{name}[{row}] is {complaint}")

@@ -220,7 +220,7 @@ def folder_for_frames(folder):
 
 
 RECORDINGS = {
-    "times-of-a-year": (arrays(t_s=lambda t_s: t_s * 1e6), ""),
+    "times-of-a-year": (arrays(t_s=lambda t_s: t_s * 1e6), "is not the time since the step before"),
     "times-twice": (arrays(t_s=lambda t_s: np.repeat(t_s[::2], 2)), "followed by an earlier or the same one"),
     "big-endian": (arrays(speed=lambda speed: speed.astype(">f8")), ""),
     "half-precision": (arrays(speed=lambda speed: speed.astype("f2")), ""),

@@ -17,6 +17,8 @@ RANGE_ERROR_M: Final = 4.0  # sigma of a position at a dilution (HDOP) of 1, sin
 
 @dataclass(frozen=True, slots=True)
 class Fix:
+    """A place at a time; ``sigma_m`` is the standard deviation along one axis, nan where nobody says it."""
+
     t_s: float
     lat_deg: float
     lon_deg: float
@@ -24,6 +26,7 @@ class Fix:
 
 
 def file_bytes(path: Path) -> bytes:
+    """The bytes of a file of bounded size. Raises TrajectoryError."""
     try:
         if (size := path.stat().st_size) > MAX_FIX_BYTES:
             raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_FIX_BYTES}; cut the track to the drive")
@@ -33,6 +36,7 @@ def file_bytes(path: Path) -> bytes:
 
 
 def file_text(path: Path, data: bytes) -> str:
+    """The text that the bytes of a file are in UTF-8. Raises TrajectoryError with the byte that is none."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -59,6 +63,7 @@ def time_s(text: str, where: str) -> float:
 
 
 def as_number(text: Any, where: str) -> float:
+    """The number that a field holds. Raises TrajectoryError, which begins with ``where``."""
     try:
         return float(text)
     except (ValueError, TypeError, OverflowError):
@@ -66,4 +71,5 @@ def as_number(text: Any, where: str) -> float:
 
 
 def hdop_note() -> str:
+    """How the accuracy was told where the file has dilutions of precision only."""
     return f"accuracy: {RANGE_ERROR_M:g} m times the dilution of precision (hdop)"

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from hippodrome.core.reading.arcs import GRADE
 from hippodrome.core.reading.config import ReaderConfig
 from hippodrome.core.types import FloatArray
 
@@ -17,17 +18,16 @@ WIDTH_SPREAD_M: Final = 0.35  # by which lanes differ from the expected width, i
 BRIGHTER: Final = 0.28  # log of how much brighter kerb, pavement and gravel are than asphalt ..
 BRIGHTER_SPREAD: Final = 0.06
 LONGER_SPREAD_M: Final = 0.5  # of the length of the longest stretch
-GRADE: Final = 2.0  # standard deviations seem this many times too small: neighbouring rows err together
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lines:
     """The lines that were fitted together."""
 
-    arc: FloatArray  # (2,) direction of the lane at the rear axle, curvature
-    covariance: FloatArray  # (2, 2)
+    arc: FloatArray  # (3,) direction of the lane at the rear axle, curvature, its change
+    covariance: FloatArray  # (3, 3)
     places_m: FloatArray  # (K,) lateral places at the rear axle
-    about: FloatArray  # (K, 3) information, mean derivative by direction, by curvature
+    about: FloatArray  # (K, 4) information, mean derivatives by the arc
     traits: FloatArray  # (K, 6) as ``line_traits`` tells them
 
 

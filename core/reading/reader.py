@@ -8,11 +8,11 @@ from typing import Final
 import cv2
 import numpy as np
 
-from hippodrome.core.reading.arcs import best_arc, fit_arc, line_places
+from hippodrome.core.reading.arcs import GRADE, best_arc, fit_arc, line_places
 from hippodrome.core.reading.config import ReaderConfig
 from hippodrome.core.reading.ground import Ground, ground_of
-from hippodrome.core.reading.lane import GRADE, Lines, Place, place_in_lane
-from hippodrome.core.reading.ridges import find_ridges
+from hippodrome.core.reading.lane import Lines, Place, place_in_lane
+from hippodrome.core.reading.ridges import find_ridges, trust_of
 from hippodrome.core.reading.traits import line_traits
 from hippodrome.core.reading.types import RoadReading
 from hippodrome.core.types import Float32Array, Frame
@@ -71,12 +71,12 @@ class RoadReader:
         ridges = find_ridges(grey, ground.x_m, ground.y_m, self._config.line_m)
         if len(ridges) < LEAST_RIDGES:
             return None
-        weight = np.ones(len(ridges))
+        weight = trust_of(ridges)
         arc = best_arc(ridges, weight)
         places = line_places(ridges, weight, arc)
         if len(places) == 0:
             return None
-        arc, covariance, places, about, owner = fit_arc(ridges, arc, places)
+        arc, covariance, places, about, owner = fit_arc(ridges, weight, arc, places)
         keep = about[:, 0] > 0.0
         if not np.all(keep):
             return None

@@ -15,11 +15,13 @@ MARGIN_PX: Final = 2.5  # a line nearer to the frame's side is cut by it
 
 
 @numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
-def y_on_circle(x: float, place: float, sin: float, cos: float, bend: float) -> float:
-    """Where the concentric line at the lateral place ``place`` of the rear axle lies, x metres ahead of it."""
+def y_on_line(x: float, place: float, arc: FloatArray) -> float:
+    """Where the line at the lateral place ``place`` of the rear axle lies, x metres ahead of it."""
+    sin, cos = np.sin(arc[0]), np.cos(arc[0])
     y = (place + sin * x) / cos
     for _ in range(4):
-        y = (place - 0.5 * bend * place * place + 0.5 * bend * (x * x + y * y) + sin * x) / cos
+        c = place + arc[2] * (cos * x + sin * y) ** 3 / 6.0
+        y = (c + 0.5 * arc[1] * (x * x + y * y - c * c) + sin * x) / cos
     return y
 
 
@@ -39,7 +41,6 @@ def line_traits(
     count, width = grey.shape
     lines = len(places)
     traits = np.zeros((lines, 6))
-    sin, cos = np.sin(arc[0]), np.cos(arc[0])
     hit = np.zeros((lines, count), np.bool_)
     for i in range(len(ridges)):
         if owner[i] >= 0:
@@ -50,7 +51,7 @@ def line_traits(
         begun, last, missed = -1.0, 0.0, 0
         for row in range(count):
             x = 0.5 * (x_m[row, 0] + x_m[row, width - 1])
-            y = y_on_circle(x, places[k], sin, cos, arc[1])
+            y = y_on_line(x, places[k], arc)
             metres = (y_m[row, 0] - y_m[row, width - 1]) / (width - 1)
             u = (y_m[row, 0] - y) / metres
             if not MARGIN_PX < u < width - 1 - MARGIN_PX:

@@ -20,7 +20,9 @@ BENDS: Final = np.array([-0.08, -0.045, -0.02, 0.0, 0.02, 0.045, 0.08])  # curva
 BIN_M, SIDE_M = 0.12, 6.0  # of the histogram of c
 MOST_TRIED: Final = 160  # ridges that are tried: more of them change nothing
 ANGLE_SIGMA, BEND_SIGMA = 0.25, 0.04  # of lanes' directions (rad) and curvatures (1/m), known beforehand
-PRIOR: Final = np.array([0.08, BEND_SIGMA, 0.015])  # of the vehicle in its lane: it mostly heads along it; change of curvature (1/m^2)
+PRIOR: Final = np.array(
+    [0.08, BEND_SIGMA, 0.015]
+)  # of the vehicle in its lane: it mostly heads along it; change of curvature (1/m^2)
 STEADY_1PM2: Final = 0.0005  # the same on a road that does not bend
 GRADE: Final = 2.0  # standard deviations seem this many times too small: neighbouring rows err together
 SHARPEST_1PM: Final = 0.15
@@ -104,7 +106,9 @@ def line_places(ridges: FloatArray, weight: FloatArray, arc: FloatArray) -> Floa
 
 
 @numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
-def fit_arc(ridges: FloatArray, trust: FloatArray, start: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+def fit_arc(
+    ridges: FloatArray, trust: FloatArray, start: FloatArray, places: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Least squares over direction, curvature, its change and the lines' places; ridges far from their line are left out.
 
     Returns the arc (3,), its covariance (3, 3), the places (K,), for each line its information and mean derivatives by the arc

@@ -29,6 +29,9 @@ class Lines:
     places_m: FloatArray  # (K,) lateral places at the rear axle
     about: FloatArray  # (K, 4) information, mean derivatives by the arc
     traits: FloatArray  # (K, 6) as ``line_traits`` tells them
+    ridges: FloatArray  # (N, 5) that were fitted
+    trust: FloatArray  # (N,)
+    owner: FloatArray  # (N,) the line of each, -1 for none
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,28 +43,42 @@ class Place:
     width_m: float
     left: int  # rows of the lines that bound it, -1 for none
     right: int
+    edges: dict[int, float]  # side (1 left, -1 right) -> log odds that the border on it is the edge of the road
 
 
-def edge_probability(lines: Lines, k: int, side: int, config: ReaderConfig) -> float:
-    """How surely a line is the edge of the road, where ``side`` (1 left, -1 right) is its outer side."""
-    _, _, stretch, _, _, ratio = lines.traits[k]
+def edge_odds(lines: Lines, k: int, side: int, config: ReaderConfig) -> float:
+    """Log odds that a line is the edge of the road, where ``side`` (1 left, -1 right) is its outer side."""
+    _, rows, stretch, _, _, ratio = lines.traits[k]
+    if rows == 0.0:
+        return 0.0
     brighter = side * math.log(max(ratio, 1e-3))
     surface = (brighter - BRIGHTER) / BRIGHTER_SPREAD + 2.0
     longer = (stretch - config.dash_m - 0.8) / LONGER_SPREAD_M
-    return 1.0 / (1.0 + math.exp(-max(min(min(max(surface, -3.0), 3.0) + min(max(longer, -0.5), 4.0), 8.0), -8.0)))
+    return min(max(surface, -3.0), 3.0) + min(max(longer, -0.5), 4.0)
 
 
-def place_in_lane(lines: Lines, width_m: float, width_sigma_m: float, config: ReaderConfig) -> Place | None:
-    """The lane between the two lines that look most like its borders; beside one of them where only one is seen."""
+def _probability(odds: float) -> float:
+    return 1.0 / (1.0 + math.exp(-max(min(odds, 8.0), -8.0)))
+
+
+def place_in_lane(
+    lines: Lines, width_m: float, width_sigma_m: float, told: dict[int, float], config: ReaderConfig
+) -> Place | None:
+    """The lane between the two lines that look most like its borders; beside one of them where only one is seen.
+
+    ``told`` are the log odds that the frames before gave for the border on each side to be the road's edge.
+    """
     best: tuple[float, int, int] | None = None
+    counts = np.bincount(lines.owner[lines.owner >= 0].astype(np.int64), minlength=len(lines.places_m))
     candidates = [k for k in range(len(lines.places_m)) if abs(lines.places_m[k]) < FARTHEST_M]
-    edges = {(k, side): edge_probability(lines, k, side, config) for k in candidates for side in (1, -1)}
+    odds = {(k, side): edge_odds(lines, k, side, config) + told.get(side, 0.0) for k in candidates for side in (1, -1)}
+    edges = {key: _probability(value) for key, value in odds.items()}
     at = {(k, side): float(lines.places_m[k]) + side * config.edge_inset_m * edges[k, side] for k, side in edges}
     for left in [*candidates, -1]:
         for right in [*candidates, -1]:
             if left == right or (left >= 0 and at[left, 1] < 0.0) or (right >= 0 and at[right, -1] > 0.0):
                 continue
-            score = sum(min(float(lines.traits[k, 1]), 25.0) for k in (left, right) if k >= 0)
+            score = sum(min(float(counts[k]), 25.0) for k in (left, right) if k >= 0)
             if left >= 0 and right >= 0:
                 width = at[left, 1] - at[right, -1]
                 if not NARROWEST_M < width < WIDEST_M:
@@ -84,4 +101,4 @@ def place_in_lane(lines: Lines, width_m: float, width_sigma_m: float, config: Re
         variance += (0.5 * width_sigma_m) ** 2
     else:
         width = at[sides[0]] - at[sides[1]]
-    return Place(middle, variance, width, best[1], best[2])
+    return Place(middle, variance, width, best[1], best[2], {side: odds[k, side] for k, side in sides})

@@ -43,7 +43,7 @@ def line_traits(
     traits = np.zeros((lines, 6))
     hit = np.zeros((lines, count), np.bool_)
     for i in range(len(ridges)):
-        if owner[i] >= 0:
+        if owner[i] >= 0 and ridges[i, 4] >= 0:
             hit[int(owner[i]), int(ridges[i, 4])] = True
     for k in range(lines):
         traits[k, 3], traits[k, 5] = np.inf, 1.0

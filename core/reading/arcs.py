@@ -129,7 +129,7 @@ def fit_arc(
             t, n = cos * x + sin * y, cos * y - sin * x
             value[i] = lateral_m(x, y, sin, cos, arc[1]) - arc[2] * t**3 / 6.0
             by[i, 0], by[i, 1], by[i, 2] = -t, -0.5 * (t * t + n * n), -(t**3) / 6.0
-            swerve = SWERVE_1PM * max(x - NEAR_M, 0.0) ** 2
+            swerve = SWERVE_1PM * (max(x - NEAR_M, 0.0) + max(-x, 0.0)) ** 2
             variance = (PIXEL_SIGMA * ridges[i, 2]) ** 2 + PLACE_SIGMA_M**2 + swerve**2
             reach = gate + 2.0 * swerve
             owner[i], weight[i] = -1.0, 0.0

@@ -15,9 +15,14 @@ from hippodrome.core.types import FloatArray
 NARROWEST_M, WIDEST_M = 2.4, 4.6  # of a lane
 FARTHEST_M: Final = 2.5  # of a lane's border from the axle of a vehicle that is in it
 WIDTH_SPREAD_M: Final = 0.35  # by which lanes differ from the expected width, in the choice of the two borders
-BRIGHTER: Final = 0.28  # log of how much brighter kerb, pavement and gravel are than asphalt ..
-BRIGHTER_SPREAD: Final = 0.06
-LONGER_SPREAD_M: Final = 0.5  # of the length of the longest stretch
+BRIGHTER: Final = 0.38  # log of how much brighter kerb, pavement and gravel are than asphalt ..
+BRIGHTER_SPREAD: Final = 0.13  # .. and its spread, also that of one lane's asphalt against the next one's
+LONGER_SPREAD_M: Final = 0.5  # of the length along which a line is seen
+FEW_ROWS: Final = 15.0  # a line seen in fewer rows tells less of its kind
+TOLD_M: Final = 4.5  # after so many metres all that is beside the axle has been ahead of the camera
+ALONG_RAD: Final = 0.2  # a lane in which the vehicle is heads no more aside than this
+BESIDE_M: Final = 0.4  # from the axle along the lane to a piece of its border that lies beside it
+LONGEST_GAP_M: Final = 6.8  # between two dashes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,13 +53,14 @@ class Place:
 
 def edge_odds(lines: Lines, k: int, side: int, config: ReaderConfig) -> float:
     """Log odds that a line is the edge of the road, where ``side`` (1 left, -1 right) is its outer side."""
-    _, rows, stretch, _, _, ratio = lines.traits[k]
+    _, rows, covered, _, _, ratio = lines.traits[k]
     if rows == 0.0:
         return 0.0
     brighter = side * math.log(max(ratio, 1e-3))
-    surface = (brighter - BRIGHTER) / BRIGHTER_SPREAD + 2.0
-    longer = (stretch - config.dash_m - 0.8) / LONGER_SPREAD_M
-    return min(max(surface, -3.0), 3.0) + min(max(longer, -0.5), 4.0)
+    surface = BRIGHTER * (2.0 * brighter - BRIGHTER) / (2.0 * BRIGHTER_SPREAD**2)
+    longer = (covered - config.longest_dash_m) / LONGER_SPREAD_M
+    weight = min(rows / FEW_ROWS, 1.0)
+    return float(weight * (min(max(surface, -1.5), 2.5) + min(max(longer, -1.0), 4.0)))
 
 
 def _probability(odds: float) -> float:
@@ -102,3 +108,25 @@ def place_in_lane(
     else:
         width = at[sides[0]] - at[sides[1]]
     return Place(middle, variance, width, best[1], best[2], {side: odds[k, side] for k, side in sides})
+
+
+def beside_the_axle(lines: Lines, place: Place, told_m: float) -> bool:
+    """Whether the rear axle is in the lane that was read, and not yet before it or past its end.
+
+    ``told_m`` is how far back what was seen is known. Without it, a lane that the vehicle heads along is taken to begin behind it.
+    """
+    if abs(float(lines.arc[0])) > ALONG_RAD:
+        return False
+    if told_m < TOLD_M:
+        return True
+    solid, dashed = -math.inf, math.inf
+    for side, k in ((1, place.left), (-1, place.right)):
+        along = np.sort(lines.ridges[lines.owner == k, 0]) if k >= 0 else np.zeros(0)
+        behind, ahead = along[along <= BESIDE_M], along[along > -BESIDE_M]
+        if len(behind) == 0 or len(ahead) == 0:
+            continue
+        gap = max(float(ahead[0] - behind[-1]), 0.0)
+        if place.edges.get(side, 0.0) > 0.0 and gap < 2.0 * BESIDE_M:
+            solid = max(solid, float(ahead[0]))
+        dashed = min(dashed, gap)
+    return solid > -BESIDE_M or dashed < LONGEST_GAP_M

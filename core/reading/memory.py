@@ -10,11 +10,12 @@ import numpy as np
 from hippodrome.core.reading.ground import Ground
 from hippodrome.core.types import FloatArray
 
-BEHIND_M: Final = 3.0  # of the rear axle: as far as borders are kept
+BEHIND_M: Final = 6.0  # of the rear axle, as far as borders are kept: the gap between two dashes
 AHEAD_M: Final = 9.0  # nothing farther than this gets out of sight from one frame to the next
 MOST: Final = 240  # ridges kept
 DRIFT: Final = 0.04  # growth of the error per metre moved, as metres per pixel of a ridge: 1.2 cm
-TOLD: Final = 0.7  # how much of what lines were taken for is still believed a frame later
+TOLD_M: Final = 6.0  # over which the belief in what a line was taken for fades
+SUREST: Final = 7.0  # log odds: no line is so surely of a kind that the next road cannot be another
 EMPTY: Final = np.zeros((0, 5))
 
 
@@ -24,18 +25,22 @@ class Memory:
     def __init__(self) -> None:
         self.ridges: FloatArray = EMPTY  # (M, 5) as ``find_ridges`` gives them, of row -1
         self.trust: FloatArray = np.zeros(0)  # (M,)
+        self.told_m = 0.0  # how far the vehicle has come while its way was told
         self.edges: dict[int, float] = {}  # side (1 left, -1 right) -> log odds that the border is the road's edge
 
     def forget(self) -> None:
         """As if nothing had been seen."""
         self.ridges, self.trust, self.edges = EMPTY, np.zeros(0), {}
+        self.told_m = 0.0
 
     def move(self, moved_m: float, turned_rad: float) -> None:
         """Into the axes of the vehicle after a step; one that is not known makes all forgotten."""
         if not (math.isfinite(moved_m) and math.isfinite(turned_rad)):
             self.forget()
             return
-        self.edges = {side: TOLD * odds for side, odds in self.edges.items()}
+        self.told_m += abs(moved_m)
+        fades = math.exp(-abs(moved_m) / TOLD_M)
+        self.edges = {side: fades * min(max(odds, -SUREST), SUREST) for side, odds in self.edges.items()}
         cos, sin = math.cos(turned_rad), math.sin(turned_rad)
         x = self.ridges[:, 0] - moved_m * math.cos(0.5 * turned_rad)
         y = self.ridges[:, 1] - moved_m * math.sin(0.5 * turned_rad)

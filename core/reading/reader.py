@@ -11,7 +11,7 @@ import numpy as np
 from hippodrome.core.reading.arcs import GRADE, best_arc, fit_arc, line_places
 from hippodrome.core.reading.config import ReaderConfig
 from hippodrome.core.reading.ground import Ground, ground_of
-from hippodrome.core.reading.lane import Lines, Place, place_in_lane
+from hippodrome.core.reading.lane import Lines, Place, beside_the_axle, place_in_lane
 from hippodrome.core.reading.memory import Memory
 from hippodrome.core.reading.ridges import find_ridges, trust_of
 from hippodrome.core.reading.traits import line_traits
@@ -51,6 +51,8 @@ class RoadReader:
         if lines is None or place is None or place.variance_m2 > self._config.largest_sigma_m**2:
             return RoadReading()
         self._remember(lines, place)
+        if not beside_the_axle(lines, place, self._memory.told_m):
+            return RoadReading()
         return RoadReading(
             offset_m=-place.middle_m,
             offset_variance_m2=place.variance_m2,

@@ -109,7 +109,7 @@ class RoadReader:
         levels, along_m = strip_levels(grey, ground.x_m, ground.y_m, lines.arc, place.middle_m, width_m)
         paint = float(np.median(lines.ridges[lines.ridges[:, 4] >= 0, 3])) if np.any(lines.ridges[:, 4] >= 0) else 0.0
         line = stop_line(levels, along_m, self._camera.forward_m, paint, self._config.stop_line_m)
-        if line is not None:
+        if line[1] < math.inf:
             return line[0], line[1], LaneEnd.STOP_LINE
         return math.nan, math.inf, LaneEnd.NOTHING
 

@@ -101,12 +101,12 @@ def _bar(
     if peak < FULL * min(total, 1.0):
         return np.nan, np.inf
     centre /= total
-    near_m, far_m = _between(along_m, forward_m, centre - 0.5 * total), _between(along_m, forward_m, centre + 0.5 * total)
+    near_m, far_m = row_distance(along_m, forward_m, centre - 0.5 * total), row_distance(along_m, forward_m, centre + 0.5 * total)
     return 2.0 / (1.0 / near_m + 1.0 / far_m) + forward_m, far_m - near_m
 
 
 @numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
-def _between(along_m: FloatArray, forward_m: float, row: float) -> float:
+def row_distance(along_m: FloatArray, forward_m: float, row: float) -> float:
     """Distance ahead of the camera at a place between two rows: its inverse grows evenly."""
     whole = min(max(int(row), 0), len(along_m) - 2)
     share = row - whole

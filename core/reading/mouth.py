@@ -27,7 +27,7 @@ RESUMED_M: Final = 0.08  # and one this far aside the same line
 MARGIN_PX: Final = 2.0
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def line_end(
     grey: Float32Array,
     x_m: Float32Array,
@@ -46,7 +46,7 @@ def line_end(
     for i in range(len(ridges)):
         if owner[i] == line and ridges[i, 4] >= 0:
             hit[int(ridges[i, 4])] = True
-    middle = 0.5 * (x_m[:, 0] + x_m[:, -1])
+    middle = 0.5 * (x_m[:, 0].astype(np.float64) + x_m[:, -1])
     last, seen, visible = -1, 0, -1
     for row in range(count):
         if visible < 0 and abs(y_on_line(middle[row], place_m, arc)) < abs(y_m[row, 0 if place_m > 0.0 else -1]):
@@ -95,14 +95,14 @@ def line_end(
     return row_distance(middle, forward_m, last - 0.5 + covered) + forward_m, (ROW_SIGMA * spacing) ** 2 + PLACE_SIGMA_M**2
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def _level(row: Float32Array, u: float) -> float:
     """Brightness between two pixels of a row."""
     whole = int(u)
-    return row[whole] + (u - whole) * (row[whole + 1] - row[whole])
+    return float(row[whole] + (u - whole) * (row[whole + 1] - row[whole]))
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def _brightest(row: Float32Array, u: float, left_px: float) -> float:
     """Highest brightness from a column to so many pixels to the left of it (to the right, if negative)."""
     low, high = min(u, u - left_px), max(u, u - left_px)

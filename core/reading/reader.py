@@ -12,7 +12,7 @@ from hippodrome.core.reading.arcs import GRADE, best_arc, fit_arc, line_places
 from hippodrome.core.reading.config import ReaderConfig
 from hippodrome.core.reading.ends import stop_line, strip_levels
 from hippodrome.core.reading.ground import Ground, ground_of
-from hippodrome.core.reading.lane import Lines, Place, beside_the_axle, place_in_lane
+from hippodrome.core.reading.lane import Lines, Place, beside_the_axle, heading_variance_rad2, place_in_lane
 from hippodrome.core.reading.memory import Memory
 from hippodrome.core.reading.mouth import line_end
 from hippodrome.core.reading.ridges import find_ridges, trust_of
@@ -67,7 +67,7 @@ class RoadReader:
             offset_m=-place.middle_m,
             offset_variance_m2=place.variance_m2,
             heading_rad=-float(lines.arc[0]),
-            heading_variance_rad2=GRADE**2 * float(lines.covariance[0, 0]),
+            heading_variance_rad2=heading_variance_rad2(lines),
             curvature_1pm=float(lines.arc[1]),
             curvature_variance_1pm2=GRADE**2 * float(lines.covariance[1, 1]),
             lane_width_m=place.width_m,

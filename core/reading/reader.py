@@ -71,6 +71,7 @@ class RoadReader:
             curvature_1pm=float(lines.arc[1]),
             curvature_variance_1pm2=GRADE**2 * float(lines.covariance[1, 1]),
             lane_width_m=place.width_m,
+            curvature_change_1pm2=float(lines.arc[2]),
         )
 
     def _ground_of(self, frame: Frame) -> Ground:

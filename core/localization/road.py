@@ -29,18 +29,23 @@ APART_M = 2.0  # way between two readings of the lane that are taken: closer one
 CHORD_M = 2.0  # half the length of the chord that gives the direction of a lane drawn in straight pieces
 BEFORE_END_M = 0.9  # from the near edge of a stop line to the end of its lane
 LANE_SIGMA_M, LANE_SIGMA_RAD = 0.06, 0.015  # errors that readings of one street share
+LOOK_M, LOOK_SIGMA_M = 8.0, 0.15  # ahead, where the place of the lane is compared, too: in bends it tells how far along
+END_APART_M = 1.0  # way between two readings of the end
 END_SIGMA_M = {LaneEnd.STOP_LINE: 0.2, LaneEnd.MOUTH: 0.3}
 UNREAD_M, UNREAD_RAD = 100.0, 1.0  # standard deviations of what was not read
 
 
 @dataclass(frozen=True, slots=True)
 class _Lane:
-    """The lane that was read, at the foot of the believed position."""
+    """The lane that was read, at the foot of the believed position, and how what was read differs from what was believed."""
 
     heading_rad: float
     across_m: float  # by how far the vehicle is farther left than believed
+    turned_rad: float  # by how much it is turned farther left
+    curvature_1pm: float
     to_end_m: float
-    heading_off_rad: float  # by how much it is turned farther left than believed
+    ahead_m: float  # by how far the lane ``LOOK_M`` ahead lies farther right than believed; nan where the lane does not reach
+    slope: float  # of the lane there against the believed heading
 
 
 class RoadSense:
@@ -98,42 +103,69 @@ class RoadSense:
         variance = float(normal @ covariance[:2, :2] @ normal) + reading.offset_variance_m2 + network.survey_sigma_m**2
         if abs(off) > min(ACROSS_M, SIGMAS * math.sqrt(variance + LANE_SIGMA_M**2)):
             return None
-        lane, at = int(near.lane[row]), float(near.position_m[row])
-        ends = poses_on_segments(self._roads, np.array([lane, lane]), np.array([at - CHORD_M, at + CHORD_M]))
-        heading = math.atan2(*(ends[1, :2] - ends[0, :2])[::-1])
+        return self._compared(reading, int(near.lane[row]), float(near.position_m[row]), off, pose)
+
+    def _compared(self, reading: RoadReading, lane: int, at_m: float, across_m: float, pose: FloatArray) -> _Lane:
+        """How the reading differs from the lane of the network at an arc length, as seen from the believed pose."""
+        length_m = float(self._roads.lane_length_m[lane])
+        along = at_m + np.concatenate([[-CHORD_M, CHORD_M], np.arange(0.0, LOOK_M + 4.0, 0.5)])
+        points = poses_on_segments(self._roads, np.full(len(along), lane), along)[:, :2]
+        chord = points[1] - points[0]
+        heading = math.atan2(chord[1], chord[0])
+        cos, sin = math.cos(pose[2]), math.sin(pose[2])
+        away = points[2:] - pose[:2]
+        x, y = cos * away[:, 0] + sin * away[:, 1], cos * away[:, 1] - sin * away[:, 0]
+        ahead, slope = math.nan, 0.0
+        if length_m - at_m > LOOK_M + 2.0 and np.all(np.diff(x) > 0.0):
+            near, far = (float(np.interp(LOOK_M + d, x, y)) for d in (-1.0, 1.0))
+            slope = 0.5 * (far - near)
+            ahead = 0.5 * (near + far) - _lane_ahead_m(reading)
         turned = float(wrap_compiled(heading + reading.heading_rad - pose[2]))
-        return _Lane(heading, off, float(self._roads.lane_length_m[lane]) - at, turned)
+        return _Lane(heading, across_m, turned, reading.curvature_1pm, length_m - at_m, ahead, slope)
 
     def _measured(self, reading: RoadReading, lane: _Lane, pose: FloatArray, covariance: FloatArray) -> PoseMeasurement | None:
-        """The believed pose, corrected by what was read; variances are large for what was not."""
+        """The believed pose, corrected by what was read; its variances are large for what was not.
+
+        What was read are linear functions of the error (along, across, turned) of the believed pose in the lane's axes.
+        """
         survey = self._roads.network.survey_sigma_m**2
-        along_m, sq_along = self._along(reading, lane, covariance)
-        off, sq_across, turned, sq_heading = 0.0, UNREAD_M**2, 0.0, UNREAD_RAD**2
-        if self.since_m >= APART_M:
-            self.since_m, off = 0.0, lane.across_m
-            sq_across = reading.offset_variance_m2 + LANE_SIGMA_M**2 + survey
-            sq_turned = reading.heading_variance_rad2 + LANE_SIGMA_RAD**2
-            if abs(lane.heading_off_rad) < SIGMAS * math.sqrt(sq_turned + covariance[2, 2]):
-                turned, sq_heading = lane.heading_off_rad, sq_turned
-        elif sq_along == math.inf:
-            return None
-        sq_along = sq_along + survey if sq_along < math.inf else UNREAD_M**2
         cos, sin = math.cos(lane.heading_rad), math.sin(lane.heading_rad)
         axes = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        return PoseMeasurement(
-            pose + axes @ np.array([along_m, off, turned]), axes @ np.diag([sq_along, sq_across, sq_heading]) @ axes.T
-        )
+        believed = axes.T @ covariance @ axes
+        rows: list[tuple[tuple[float, float, float], float, float]] = []
+        if self.since_m >= APART_M:
+            rows.append(((0.0, 1.0, 0.0), lane.across_m, reading.offset_variance_m2 + LANE_SIGMA_M**2 + survey))
+            rows.append(((-lane.curvature_1pm, 0.0, 1.0), lane.turned_rad, reading.heading_variance_rad2 + LANE_SIGMA_RAD**2))
+            if math.isfinite(lane.ahead_m):
+                rows.append(((-lane.slope, 1.0, LOOK_M), lane.ahead_m, LOOK_SIGMA_M**2 + survey))
+        if reading.end is not LaneEnd.NOTHING and self._since_end_m >= END_APART_M:
+            off = lane.to_end_m - (BEFORE_END_M if reading.end is LaneEnd.STOP_LINE else 0.0) - reading.end_m
+            if abs(off) < ALONG_M:
+                rows.append(((1.0, 0.0, 0.0), off, reading.end_variance_m2 + END_SIGMA_M[reading.end] ** 2 + survey))
+        kept = [row for row in rows if _agrees(row, believed)]
+        if not kept:
+            return None
+        self.since_m = 0.0 if any(row[0][1] == 1.0 for row in kept) else self.since_m
+        self._since_end_m = 0.0 if any(row[0][0] == 1.0 for row in kept) else self._since_end_m
+        by = np.array([row[0] for row in kept])
+        weight = 1.0 / np.array([row[2] for row in kept])
+        told = np.linalg.inv(by.T @ (weight[:, None] * by) + np.diag([UNREAD_M**-2, UNREAD_M**-2, UNREAD_RAD**-2]))
+        off = told @ by.T @ (weight * np.array([row[1] for row in kept]))
+        return PoseMeasurement(pose + axes @ off, axes @ told @ axes.T)
 
-    def _along(self, reading: RoadReading, lane: _Lane, covariance: FloatArray) -> tuple[float, float]:
-        """By how much the lane's end says that the vehicle is farther along than believed, and the variance; inf: it says nothing."""
-        if reading.end is LaneEnd.NOTHING or self._since_end_m < 0.5 * APART_M:
-            return 0.0, math.inf
-        expected = lane.to_end_m - (BEFORE_END_M if reading.end is LaneEnd.STOP_LINE else 0.0)
-        off = expected - reading.end_m
-        ahead = np.array([math.cos(lane.heading_rad), math.sin(lane.heading_rad)])
-        variance = reading.end_variance_m2 + END_SIGMA_M[reading.end] ** 2
-        believed = float(ahead @ covariance[:2, :2] @ ahead)
-        if abs(off) > min(ALONG_M, SIGMAS * math.sqrt(variance + believed + self._roads.network.survey_sigma_m**2)):
-            return 0.0, math.inf
-        self._since_end_m = 0.0
-        return off, variance
+
+def _agrees(row: tuple[tuple[float, float, float], float, float], believed: FloatArray) -> bool:
+    """Whether something that was read is near enough to what was believed of it."""
+    by = np.array(row[0])
+    return row[1] ** 2 < SIGMAS**2 * (row[2] + float(by @ believed @ by))
+
+
+def _lane_ahead_m(reading: RoadReading) -> float:
+    """Where the middle of the lane that was read lies ``LOOK_M`` ahead, left positive."""
+    sin, cos = math.sin(-reading.heading_rad), math.cos(reading.heading_rad)
+    y = -reading.offset_m
+    for _ in range(4):
+        along = cos * LOOK_M + sin * y
+        bent = 0.5 * reading.curvature_1pm * (LOOK_M**2 + y * y) + reading.curvature_change_1pm2 * along**3 / 6.0
+        y = (-reading.offset_m + bent + sin * LOOK_M) / cos
+    return y

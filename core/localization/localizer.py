@@ -169,6 +169,8 @@ class Localizer:
         """
         noise, pose = self._config.injection, self._recogniser.pose(match)
         along_m = LINK_REACH_M if self._places.at_end[match.cell] else noise.along_m
+        if self._road is not None:
+            along_m *= self._road.distrust()
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         return PoseMeasurement(pose, turn @ np.diag([along_m**2, noise.across_m**2, noise.heading_rad**2]) @ turn.T)

@@ -31,6 +31,7 @@ BEFORE_END_M = 0.9  # from the near edge of a stop line to the end of its lane
 LANE_SIGMA_M, LANE_SIGMA_RAD = 0.06, 0.015  # errors that readings of one street share
 LOOK_M, LOOK_SIGMA_M = 8.0, 0.15  # ahead, where the place of the lane is compared, too: in bends it tells how far along
 END_APART_M = 1.0  # way between two readings of the end
+END_WORTH, END_WORTH_M = 2.5, 35.0  # what the end of a lane is worth against views, and the way over which that fades
 END_SIGMA_M = {LaneEnd.STOP_LINE: 0.2, LaneEnd.MOUTH: 0.3}
 UNREAD_M, UNREAD_RAD = 100.0, 1.0  # standard deviations of what was not read
 
@@ -55,12 +56,16 @@ class RoadSense:
         self._roads, self._camera = roads, camera
         self._reader: RoadReader | None = None
         self.since_m = math.inf  # driven since the lane was read last
-        self._since_end_m = math.inf  # and since its end was
+        self.since_end_m = math.inf  # and since its end was
 
     def move(self, moved_m: float) -> None:
         """Count the way driven."""
         self.since_m += abs(moved_m)
-        self._since_end_m += abs(moved_m)
+        self.since_end_m += abs(moved_m)
+
+    def distrust(self) -> float:
+        """By how much less views are to be trusted along the road: their errors, which are the map's, are alike for a street."""
+        return 1.0 + END_WORTH * math.exp(-self.since_end_m / END_WORTH_M)
 
     def measure(
         self, frame: Frame, moved_m: float, turned_rad: float, pose: FloatArray, covariance: FloatArray
@@ -138,7 +143,7 @@ class RoadSense:
             rows.append(((-lane.curvature_1pm, 0.0, 1.0), lane.turned_rad, reading.heading_variance_rad2 + LANE_SIGMA_RAD**2))
             if math.isfinite(lane.ahead_m):
                 rows.append(((-lane.slope, 1.0, LOOK_M), lane.ahead_m, LOOK_SIGMA_M**2 + survey))
-        if reading.end is not LaneEnd.NOTHING and self._since_end_m >= END_APART_M:
+        if reading.end is not LaneEnd.NOTHING and self.since_end_m >= END_APART_M:
             off = lane.to_end_m - (BEFORE_END_M if reading.end is LaneEnd.STOP_LINE else 0.0) - reading.end_m
             if abs(off) < ALONG_M:
                 rows.append(((1.0, 0.0, 0.0), off, reading.end_variance_m2 + END_SIGMA_M[reading.end] ** 2 + survey))
@@ -146,7 +151,7 @@ class RoadSense:
         if not kept:
             return None
         self.since_m = 0.0 if any(row[0][1] == 1.0 for row in kept) else self.since_m
-        self._since_end_m = 0.0 if any(row[0][0] == 1.0 for row in kept) else self._since_end_m
+        self.since_end_m = 0.0 if any(row[0][0] == 1.0 for row in kept) else self.since_end_m
         by = np.array([row[0] for row in kept])
         weight = 1.0 / np.array([row[2] for row in kept])
         told = np.linalg.inv(by.T @ (weight[:, None] * by) + np.diag([UNREAD_M**-2, UNREAD_M**-2, UNREAD_RAD**-2]))

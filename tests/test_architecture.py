@@ -33,8 +33,8 @@ CORE_ROOMS = {
     "matching": {"matching/search", "roads"},
     "refinement": {"matching", "matching/hmm", "matching/search", "roads", "solvers"},
     "localization/beliefs": {"attractors", "roads"},
-    "localization": {"localization/beliefs", "roads", "views"},
-    "reading": set(),
+    "localization": {"localization/beliefs", "reading", "roads", "views"},
+    "reading": {"views/egomotion"},
     "navigation": {"localization", "localization/beliefs", "reading", "roads", "views"},
 }
 # The rooms of eval from the lowest to the highest: each may import only those before it.

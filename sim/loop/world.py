@@ -77,6 +77,11 @@ class World:
         """How often SUMO had taken the ego off the road since the reset; it was put back at once."""
         return self._puppet.put_back
 
+    @property
+    def misplaced(self) -> int:
+        """Steps since the reset after which SUMO had the ego on another lane than it is on: others may not have seen it."""
+        return self._puppet.misplaced
+
     def __enter__(self) -> Self:
         return self
 
@@ -189,15 +194,16 @@ class World:
     def _move(self) -> None:
         """Finds the ego's lanes, tells SUMO, lets SUMO step, and looks round."""
         pose, signals = self._car.pose_m, self._signals
-        self._footing = stand(self.ground, pose, self._lane, self._front_lane)
+        self._footing = stand(self.ground, pose, self._lane, self._front_lane, self._expected())
         self._lane, self._front_lane = self._footing.lane, self._footing.front_lane
         last = self._before
         if self._front_lane >= 0 and not self.network.is_internal[self._front_lane]:
             self._before = self._front_lane
         speed, put_back = self._car.speed_mps, self.put_back
         try:
-            self._puppet.place(pose, speed, self._front_lane, self._before, self._indicator)
+            self._puppet.place(self._footing.front_m, speed, self._front_lane, self._before, self._indicator)
             libsumo.simulationStep()
+            self._puppet.check(self._front_lane)
             self._users = self._onlooker.near(*pose[:2])
             self._ahead = self._lookout.look(self._footing, self._before, self._indicator, speed, self._users, pose[:2])
             user_lanes = self._lookout.lanes_of(self._users)
@@ -211,6 +217,8 @@ class World:
             user_lanes=user_lanes,
             front_lane=self._front_lane,
             against=self._footing.against,
+            line=self.ground.line(self._lane, self._front_lane, self._before),
+            strip_outside_m=self._footing.strip_outside_m,
             off_road=self._footing.off_road,
             signals={lane: (signals[lane], now[lane]) for lane in now if lane in signals} if last == self._before else {},
             coming=self._ahead.coming,
@@ -232,6 +240,13 @@ class World:
             frame = self._sight.frame(seen_from, self._users, np.random.default_rng([self._seed, self._steps]))
         observation = Observation(truth.t_s, STEP_S, speed, yaw_rate, frame)
         return Sensed(observation, radar, truth, self._events, self._users.poses_m)
+
+    def _expected(self) -> int:
+        """The first lane inside the junction ahead that the indicator means; in the junction, the one that the front is on."""
+        if self._front_lane >= 0 and self.network.is_internal[self._front_lane]:
+            return self._front_lane
+        way = self.ways.meant(self._before, self._indicator) if self._before >= 0 else None
+        return way.inside[0] if way is not None and way.inside else -1
 
     def _look_down(self) -> Truth:
         pose, car, footing = self._car.pose_m, self._car, self._footing

@@ -6,7 +6,7 @@ import math
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self
+from typing import ClassVar, Final, Self
 
 import libsumo
 import numpy as np
@@ -25,6 +25,7 @@ from hippodrome.sim.loop.puppet import Puppet
 from hippodrome.sim.loop.radar import measured, nearest_ahead
 from hippodrome.sim.loop.rights import Rights
 from hippodrome.sim.loop.sight import Sight
+from hippodrome.sim.loop.top_view import TopView
 from hippodrome.sim.loop.types import EventKind, LanePlace, Sensed, Truth
 from hippodrome.sim.loop.users import Onlooker
 from hippodrome.sim.loop.walls import Walls
@@ -45,16 +46,18 @@ ENDS_M: Final = 3.0  # a drawn start keeps this far from its lane's ends
 
 
 class World:
-    """A scenario's town with its traffic, in which somebody drives the ego. One at a time per process, as SUMO and GL want it.
+    """A scenario's town with its traffic, in which somebody drives the ego.
 
-    The localization drive of the scenario says traffic, light and weather. The same seed and the same commands give the same
-    bytes.
+    SUMO and GL are one per process: a world that is reset takes them from another one. The localization drive of the scenario
+    says traffic, light and weather. The same seed and the same commands give the same bytes.
 
     Args:
         scenario: what to build; its camera, noise and localization drive count.
         root: folder below which generated towns are kept.
         draw: whether frames are drawn; without them observations have none, no GL is needed and a step costs a third.
     """
+
+    _live: ClassVar[World | None] = None  # SUMO and GL are one per process: whoever is reset takes them
 
     def __init__(self, scenario: Scenario, root: Path, draw: bool = True) -> None:
         self.scenario = scenario
@@ -90,18 +93,24 @@ class World:
 
     def close(self) -> None:
         """Ends SUMO and frees the renderer; a second call does nothing."""
+        self._end()
+        self._sight.close()
+        if World._live is self:
+            World._live = None
+
+    def _end(self) -> None:
         if self._sumo is not None:
             self._sumo.close()
             self._sumo = None
-        self._sight.close()
 
     def reset(self, seed: int, start: LanePlace | None = None) -> Sensed:
         """Begins anew: fresh traffic, the ego standing at ``start``, or at a place drawn by the seed.
 
         Raises HippodromeError where the place is not on the network, or SUMO fails.
         """
-        if self._sumo is not None:
-            self._sumo.close()
+        if World._live is not None:
+            World._live.close() if World._live is not self else self._end()
+        World._live = self
         rng_traffic, rng_start, self._rng_odometry, self._rng_radar = (np.random.default_rng([seed, k]) for k in range(4))
         self._seed, ego = seed, self._drive.ego
         lane, position_m = self._start(start, rng_start)
@@ -138,7 +147,9 @@ class World:
             HippodromeError: a command is not a finite number, there was no reset, or SUMO fails.
         """
         if self._sumo is None:
-            raise HippodromeError("world: step() before reset(), or after close(); call reset(seed) first")
+            raise HippodromeError(
+                "world: step() before reset(), or after close() or the reset of another world; call reset(seed)"
+            )
         if not (math.isfinite(acceleration_mps2) and math.isfinite(steering_rad)):
             raise HippodromeError(
                 f"world: command ({acceleration_mps2}, {steering_rad}) at {self._steps * STEP_S:.1f} s is not two finite numbers"
@@ -240,6 +251,10 @@ class World:
             frame = self._sight.frame(seen_from, self._users, np.random.default_rng([self._seed, self._steps]))
         observation = Observation(truth.t_s, STEP_S, speed, yaw_rate, frame)
         return Sensed(observation, radar, truth, self._events, self._users.poses_m)
+
+    def picture(self, view: TopView) -> Frame:
+        """The town from above, as it is now."""
+        return view.draw(self._car.pose_m, self._users.poses_m, self._users.sizes_m)
 
     def _expected(self) -> int:
         """The first lane inside the junction ahead that the indicator means; in the junction, the one that the front is on."""

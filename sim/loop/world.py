@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import ClassVar, Final, Self
@@ -19,10 +20,12 @@ from hippodrome.sim.loop.car import Car, ahead_of
 from hippodrome.sim.loop.events import Watch
 from hippodrome.sim.loop.footing import height_and_pitch, stand
 from hippodrome.sim.loop.ground import Ground
+from hippodrome.sim.loop.lamps import signal_heads
 from hippodrome.sim.loop.moment import Moment
 from hippodrome.sim.loop.odometry import Odometry
 from hippodrome.sim.loop.puppet import Puppet
 from hippodrome.sim.loop.radar import measured, nearest_ahead
+from hippodrome.sim.loop.recorder import Recorder
 from hippodrome.sim.loop.rights import Rights
 from hippodrome.sim.loop.sight import Sight
 from hippodrome.sim.loop.top_view import TopView
@@ -71,8 +74,10 @@ class World:
         mapped_m = (1.0 - scenario.mapping.tour.revisit_share) * scenario.mapping.tour.planned_length_m()
         self._area = toured_area(self._graph, max(mapped_m, ROAM_PER_VEHICLE_M * self._drive.traffic.vehicles))
         self._walls = Walls(self.town, scenario.seed, scene_origin_m(self.town))
-        self._sight = Sight(scenario, self.town, self._points_of_area(), STEP_S)
+        self.heads = signal_heads(self.ground, self.ways, self._rights)
+        self._sight = Sight(scenario, self.town, self._points_of_area(), self.heads, STEP_S)
         self._draw = draw
+        self._recorder: Recorder | None = None
         self._sumo: ExitStack | None = None
 
     @property
@@ -250,7 +255,27 @@ class World:
             seen_from = np.array([*pose, *height_and_pitch(self.ground, pose, self._footing)])
             frame = self._sight.frame(seen_from, self._users, np.random.default_rng([self._seed, self._steps]))
         observation = Observation(truth.t_s, STEP_S, speed, yaw_rate, frame)
-        return Sensed(observation, radar, truth, self._events, self._users.poses_m)
+        sensed = Sensed(observation, radar, truth, self._events, self._users.poses_m)
+        if self._recorder is not None:
+            self._recorder.add(sensed, self._users, self._seed, height_and_pitch(self.ground, pose, self._footing)[:1])
+        return sensed
+
+    @contextmanager
+    def recording(self, folder: Path) -> Iterator[None]:
+        """Writes the drive that begins with the next ``reset`` in the block as a recording, which is finished after the block.
+
+        Args:
+            folder: which must not exist, or be empty.
+
+        Raises:
+            HippodromeError: there is something in the folder, or no drive was made.
+        """
+        self._recorder = Recorder(folder, self.scenario, self.network)
+        try:
+            yield
+            self._recorder.finish(self.town.net_file)
+        finally:
+            self._recorder = None
 
     def picture(self, view: TopView) -> Frame:
         """The town from above, as it is now."""

@@ -13,10 +13,10 @@ import libsumo
 import numpy as np
 
 from hippodrome.core.navigation.types import Indicator
-from hippodrome.core.types import FloatArray, Frame, HippodromeError, Observation
-from hippodrome.sim.ego import LENGTH_M, REAR_AXLE_TO_FRONT_M, WHEELBASE_M
+from hippodrome.core.types import Frame, HippodromeError, Observation
+from hippodrome.sim.ego import LENGTH_M
 from hippodrome.sim.loop.ahead import Lookout
-from hippodrome.sim.loop.car import Car, ahead_of
+from hippodrome.sim.loop.car import Car
 from hippodrome.sim.loop.events import Watch
 from hippodrome.sim.loop.footing import height_and_pitch, stand
 from hippodrome.sim.loop.ground import Ground
@@ -28,6 +28,7 @@ from hippodrome.sim.loop.radar import measured, nearest_ahead
 from hippodrome.sim.loop.recorder import Recorder
 from hippodrome.sim.loop.rights import Rights
 from hippodrome.sim.loop.sight import Sight
+from hippodrome.sim.loop.start import clear_room, drawn_start, lane_and_position, points_of
 from hippodrome.sim.loop.top_view import TopView
 from hippodrome.sim.loop.types import EventKind, LanePlace, Sensed, Truth
 from hippodrome.sim.loop.users import Onlooker
@@ -44,8 +45,6 @@ STEP_S: Final = SUMO_STEP_S
 WARM_UP_S: Final = 20.0  # traffic spreads before the ego is there
 REFILL_STEPS: Final = 10  # traffic is topped up once a second
 ROAM_PER_VEHICLE_M: Final = 200.0  # as for recorded drives
-ROOM_AHEAD_M: Final = 12.0  # at the start the road is clear this far before and behind the ego
-ENDS_M: Final = 3.0  # a drawn start keeps this far from its lane's ends
 
 
 class World:
@@ -75,7 +74,7 @@ class World:
         self._area = toured_area(self._graph, max(mapped_m, ROAM_PER_VEHICLE_M * self._drive.traffic.vehicles))
         self._walls = Walls(self.town, scenario.seed, scene_origin_m(self.town))
         self.heads = signal_heads(self.ground, self.ways, self._rights)
-        self._sight = Sight(scenario, self.town, self._points_of_area(), self.heads, STEP_S)
+        self._sight = Sight(scenario, self.town, points_of(self.network, self._graph.edges[self._area]), self.heads, STEP_S)
         self._draw = draw
         self._recorder: Recorder | None = None
         self._sumo: ExitStack | None = None
@@ -118,7 +117,9 @@ class World:
         World._live = self
         rng_traffic, rng_start, self._rng_odometry, self._rng_radar = (np.random.default_rng([seed, k]) for k in range(4))
         self._seed, ego = seed, self._drive.ego
-        lane, position_m = self._start(start, rng_start)
+        edges = self._graph.edges[self._area]
+        place = drawn_start(self.network, edges, rng_start) if start is None else lane_and_position(self.network, start)
+        lane, position_m = place
         self._sumo = ExitStack()
         types = vehicle_types_xml(ego.accel_mps2, ego.decel_mps2, LENGTH_M)
         self._sumo.enter_context(sumo_run(self.town.net_file, types, seed))
@@ -136,7 +137,7 @@ class World:
         self._lane, self._front_lane, self._before = lane, lane, lane
         self._indicator, self._accel_mps2 = Indicator.STRAIGHT, 0.0
         self._signals: dict[int, str] = {}
-        self.cleared = self._clear_room()
+        self.cleared = clear_room(self._onlooker.near(*self._car.pose_m[:2]), self._car.pose_m)
         self._move()
         return self._sensed(0.0, 0.0)
 
@@ -175,37 +176,6 @@ class World:
         """Stands the ego somewhere else, for tests and experiments; it is there from the next step on."""
         self._car = Car(*pose_m)
         self._lane = self._front_lane = self._before = -1
-
-    def _start(self, start: LanePlace | None, rng: np.random.Generator) -> tuple[int, float]:
-        """Lane and position of the rear axle at the start."""
-        network = self.network
-        if start is not None:
-            if start.lane_id not in network.lane_ids:
-                raise HippodromeError(f"{self.town.net_file}: no lane {start.lane_id!r} for cars, where the drive is to start")
-            return network.lane_ids.index(start.lane_id), start.position_m
-        room = REAR_AXLE_TO_FRONT_M + 2.0 * ENDS_M
-        lengths = network.lane_lengths_m()
-        inside = np.isin(network.lane_edge, self._graph.edges[self._area]) & ~network.is_internal
-        long = np.flatnonzero(inside & (lengths > room))
-        lanes = long if len(long) else np.flatnonzero(inside)
-        spare = np.maximum(lengths[lanes] - room, 0.1)
-        lane = int(rng.choice(lanes, p=spare / spare.sum()))
-        return lane, min(ENDS_M, 0.5 * float(lengths[lane])) + float(rng.uniform(0.0, max(lengths[lane] - room, 0.0)))
-
-    def _points_of_area(self) -> FloatArray:
-        """Points (n, 2) of the lanes that traffic and the ego drive on: what can be seen from them is drawn."""
-        network = self.network
-        inside = np.isin(network.lane_edge, self._graph.edges[self._area])
-        return network.points_m[np.repeat(inside, np.diff(network.point_start))]
-
-    def _clear_room(self) -> int:
-        """Takes the vehicles off the road that are where the ego begins; how many."""
-        users = self._onlooker.near(*self._car.pose_m[:2])
-        middle = ahead_of(self._car.pose_m, 0.5 * WHEELBASE_M)
-        near = np.hypot(*(users.poses_m[:, :2] - middle).T) < ROOM_AHEAD_M
-        for k in np.flatnonzero(near):
-            libsumo.vehicle.remove(users.names[k])
-        return int(near.sum())
 
     def _move(self) -> None:
         """Finds the ego's lanes, tells SUMO, lets SUMO step, and looks round."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -16,6 +16,7 @@ from hippodrome.core.navigation.types import Indicator
 from hippodrome.core.types import Frame, HippodromeError, Observation
 from hippodrome.sim.ego import LENGTH_M
 from hippodrome.sim.loop.ahead import Lookout
+from hippodrome.sim.loop.barriers import bar, closed_edges
 from hippodrome.sim.loop.car import Car
 from hippodrome.sim.loop.events import Watch
 from hippodrome.sim.loop.footing import height_and_pitch, stand
@@ -57,11 +58,12 @@ class World:
         scenario: what to build; its camera, noise and localization drive count.
         root: folder below which generated towns are kept.
         draw: whether frames are drawn; without them observations have none, no GL is needed and a step costs a third.
+        closed: SUMO's names of roads on which nobody gets through: a van stands across each lane, and traffic goes elsewhere.
     """
 
     _live: ClassVar[World | None] = None  # SUMO and GL are one per process: whoever is reset takes them
 
-    def __init__(self, scenario: Scenario, root: Path, draw: bool = True) -> None:
+    def __init__(self, scenario: Scenario, root: Path, draw: bool = True, closed: Sequence[str] = ()) -> None:
         self.scenario = scenario
         self.town = build_town(scenario.town, scenario.seed, root / "towns")
         self.network = self.town.network
@@ -71,7 +73,9 @@ class World:
         self._rights = Rights(self.town.net_file, self.network)
         self._lookout = Lookout(self.ground, self.ways, self._rights)
         mapped_m = (1.0 - scenario.mapping.tour.revisit_share) * scenario.mapping.tour.planned_length_m()
-        self._area = toured_area(self._graph, max(mapped_m, ROAM_PER_VEHICLE_M * self._drive.traffic.vehicles))
+        area = toured_area(self._graph, max(mapped_m, ROAM_PER_VEHICLE_M * self._drive.traffic.vehicles))
+        self._closed = closed_edges(self.network, closed)
+        self._area = area[~np.isin(self._graph.edges[area], self._closed)]
         self._walls = Walls(self.town, scenario.seed, scene_origin_m(self.town))
         self.heads = signal_heads(self.ground, self.ways, self._rights)
         self._sight = Sight(scenario, self.town, points_of(self.network, self._graph.edges[self._area]), self.heads, STEP_S)
@@ -124,7 +128,9 @@ class World:
         types = vehicle_types_xml(ego.accel_mps2, ego.decel_mps2, LENGTH_M)
         self._sumo.enter_context(sumo_run(self.town.net_file, types, seed))
         climbs = self.town.heights_m is not None
-        self._others = BackgroundTraffic(self._drive.traffic, self.network, self._graph, self._area, rng_traffic, climbs)
+        vans = bar(self.network, self._closed)
+        traffic = self._drive.traffic.model_copy(update={"vehicles": self._drive.traffic.vehicles + vans})
+        self._others = BackgroundTraffic(traffic, self.network, self._graph, self._area, rng_traffic, climbs)
         self._watch = Watch(self._rights)
         self._onlooker, self._puppet = Onlooker(climbs), Puppet(self.network, self.ways)
         self._odometry = Odometry(self.scenario.self_motion_noise, self._rng_odometry)
@@ -160,16 +166,15 @@ class World:
             raise HippodromeError(
                 f"world: command ({acceleration_mps2}, {steering_rad}) at {self._steps * STEP_S:.1f} s is not two finite numbers"
             )
-        before, speed, heading = self._car.pose_m, self._car.speed_mps, self._car.heading_rad
+        (x, y, _), speed, heading = self._car.pose_m, self._car.speed_mps, self._car.heading_rad
         self._car.drive(acceleration_mps2, steering_rad, STEP_S)
+        travelled = math.hypot(self._car.pose_m[0] - x, self._car.pose_m[1] - y)
+        self._driven_m += travelled
         self._indicator, self._accel_mps2 = indicator, (self._car.speed_mps - speed) / STEP_S
         self._steps += 1
         if self._steps % REFILL_STEPS == 0:
             self._others.refill(ego_on_road=True)
         self._move()
-        now = self._car.pose_m
-        travelled = math.hypot(now[0] - before[0], now[1] - before[1])
-        self._driven_m += travelled
         return self._sensed(travelled, self._car.heading_rad - heading)
 
     def teleport(self, pose_m: tuple[float, float, float]) -> None:
@@ -185,6 +190,7 @@ class World:
         last = self._before
         if self._front_lane >= 0 and not self.network.is_internal[self._front_lane]:
             self._before = self._front_lane
+        self._lift = height_and_pitch(self.ground, pose, self._footing)
         speed, put_back = self._car.speed_mps, self.put_back
         try:
             self._puppet.place(self._footing.front_m, speed, self._front_lane, self._before, self._indicator)
@@ -217,17 +223,17 @@ class World:
 
     def _sensed(self, travelled_m: float, turned_rad: float) -> Sensed:
         truth, pose = self._truth, self._truth.pose_m
-        speed, yaw_rate = self._odometry.sense(travelled_m, turned_rad, STEP_S)
+        speed, yaw_rate = self._odometry.sense(travelled_m / self._level(), turned_rad, STEP_S)
         gap, other = nearest_ahead(pose, self._car.curvature_1pm, self._users)
         radar = measured(gap, other, self._car.speed_mps, self._ahead.way_is_free, self._ahead.lamp, self._rng_radar)
         frame: Frame | None = None
         if self._draw and self._sight.is_due(self._steps):
-            seen_from = np.array([*pose, *height_and_pitch(self.ground, pose, self._footing)])
+            seen_from = np.array([*pose, *self._lift])
             frame = self._sight.frame(seen_from, self._users, np.random.default_rng([self._seed, self._steps]))
         observation = Observation(truth.t_s, STEP_S, speed, yaw_rate, frame)
         sensed = Sensed(observation, radar, truth, self._events, self._users.poses_m)
         if self._recorder is not None:
-            self._recorder.add(sensed, self._users, self._seed, height_and_pitch(self.ground, pose, self._footing)[:1])
+            self._recorder.add(sensed, self._users, self._seed, self._lift[:1])
         return sensed
 
     @contextmanager
@@ -251,6 +257,10 @@ class World:
         """The town from above, as it is now."""
         return view.draw(self._car.pose_m, self._users.poses_m, self._users.sizes_m)
 
+    def _level(self) -> float:
+        """Metres seen from above, as the bicycle is driven, per metre along the slope, as its wheels roll."""
+        return math.cos(self._lift[1]) if self._lift else 1.0
+
     def _expected(self) -> int:
         """The first lane inside the junction ahead that the indicator means; in the junction, the one that the front is on."""
         if self._front_lane >= 0 and self.network.is_internal[self._front_lane]:
@@ -265,7 +275,7 @@ class World:
             x_m=pose[0],
             y_m=pose[1],
             heading_rad=pose[2],
-            speed_mps=car.speed_mps,
+            speed_mps=car.speed_mps / self._level(),
             yaw_rate_radps=car.speed_mps * car.curvature_1pm,
             acceleration_mps2=self._accel_mps2,
             steering_rad=car.steering_rad,

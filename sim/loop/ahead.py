@@ -73,6 +73,16 @@ class Lookout:
         entry = Entry(lane, line_m, way_m, way.turn_rad, speed_mps, letter)
         return Ahead(signals, coming, not in_the_way(entry, coming, self._rights), LAMPS.get(letter, Lamp.NONE))
 
+    def lamps_near(self, x_m: float, y_m: float, reach_m: float) -> dict[tuple[float, float, float], str]:
+        """SUMO's letters of the signals near a place, by x, y and width of the lane's end; of several the green one."""
+        found: dict[tuple[float, float, float], str] = {}
+        for lane in self._rights.signal_of:
+            x, y = self._ground.network.lane_points_m(lane)[0].tolist()
+            letter, at = self._letter(lane), (round(x, 1), round(y, 1), float(self._ground.network.width_m[lane]))
+            if abs(x - x_m) < reach_m and abs(y - y_m) < reach_m and (at not in found or letter in "gG"):
+                found[at] = letter
+        return found
+
     def lanes_of(self, users: Users) -> list[int]:
         """The lanes (k,) that vehicles are on, -1 where they are closed to cars."""
         return [self._lane_of.get(libsumo.vehicle.getLaneID(name), -1) for name in users.names]

@@ -255,7 +255,8 @@ class World:
 
     def picture(self, view: TopView) -> Frame:
         """The town from above, as it is now."""
-        return view.draw(self._car.pose_m, self._users.poses_m, self._users.sizes_m)
+        pose, users = self._car.pose_m, self._users
+        return view.draw(pose, users.poses_m, users.sizes_m, self._lookout.lamps_near(*pose[:2], view.reach_m))
 
     def _level(self) -> float:
         """Metres seen from above, as the bicycle is driven, per metre along the slope, as its wheels roll."""

@@ -8,7 +8,7 @@ import libsumo
 import numpy as np
 
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import FloatArray, HippodromeError, IntArray
+from hippodrome.core.types import HippodromeError, IntArray
 from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M, WHEELBASE_M
 from hippodrome.sim.loop.car import ahead_of
 from hippodrome.sim.loop.types import LanePlace
@@ -48,8 +48,3 @@ def clear_room(users: Users, pose_m: tuple[float, float, float]) -> int:
     for k in np.flatnonzero(near):
         libsumo.vehicle.remove(users.names[k])
     return int(near.sum())
-
-
-def points_of(network: RoadNetwork, edges: IntArray) -> FloatArray:
-    """Points (n, 2) of the lanes of some edges."""
-    return network.points_m[np.repeat(np.isin(network.lane_edge, edges), np.diff(network.point_start))]

@@ -29,7 +29,7 @@ from hippodrome.sim.loop.radar import measured, nearest_ahead
 from hippodrome.sim.loop.recorder import Recorder
 from hippodrome.sim.loop.rights import Rights
 from hippodrome.sim.loop.sight import Sight
-from hippodrome.sim.loop.start import clear_room, drawn_start, lane_and_position, points_of
+from hippodrome.sim.loop.start import clear_room, drawn_start, lane_and_position
 from hippodrome.sim.loop.top_view import TopView
 from hippodrome.sim.loop.types import EventKind, LanePlace, Sensed, Truth
 from hippodrome.sim.loop.users import Onlooker
@@ -78,7 +78,7 @@ class World:
         self._area = area[~np.isin(self._graph.edges[area], self._closed)]
         self._walls = Walls(self.town, scenario.seed, scene_origin_m(self.town))
         self.heads = signal_heads(self.ground, self.ways, self._rights)
-        self._sight = Sight(scenario, self.town, points_of(self.network, self._graph.edges[self._area]), self.heads, STEP_S)
+        self._sight = Sight(scenario, self.town, self.heads, STEP_S)
         self._draw = draw
         self._recorder: Recorder | None = None
         self._sumo: ExitStack | None = None

@@ -5,6 +5,8 @@ import sys
 import gymnasium
 import numpy as np
 
+import hippodrome.envs  # noqa: F401  # makes the environment known
+
 FOCAL_PX, CAMERA_M, LINE_M = 80.0, 1.4, 1.4  # of the default camera; from the lane's middle to the line
 AHEAD_M = 6.0  # where the line is looked at
 CRUISE = 1.6  # map units per second, some 3 m/s

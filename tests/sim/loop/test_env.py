@@ -1,6 +1,8 @@
 """The environment of Gymnasium: its own checker, what is observed and paid, and a lane keeper of thirty lines."""
 
 import runpy
+import subprocess
+import sys
 import tomllib
 import warnings
 from importlib import import_module
@@ -11,14 +13,12 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from hippodrome._gymnasium import register
 from hippodrome.core.types import HippodromeError
+from hippodrome.envs import register
 from hippodrome.sim.loop.reward import FINES_M
 from hippodrome.sim.loop.types import EventKind
 from hippodrome.sim.loop.wrappers import SiUnits, without_truth
 from tests.sim.loop import small
-
-register()
 
 
 @pytest.fixture
@@ -39,6 +39,11 @@ def test_the_entry_point_is_the_one_that_registers():
     project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
     module, _, name = project["entry-points"]["gymnasium.envs"]["hippodrome"].partition(":")
     assert getattr(import_module(module), name) is register
+
+
+def test_the_module_may_be_named_in_place_of_being_imported(tmp_path):
+    code = "import gymnasium; gymnasium.make('hippodrome.envs:hippodrome/Town-v0', scenario='towns/grid').close()"
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
 
 
 @pytest.mark.parametrize("options", [{}, {"radar": True, "indicators": True}])

@@ -97,6 +97,11 @@ class Localizer:
         self._match: PlaceMatch | None = None  # what the last query frame showed
         self._fix = Fix()
 
+    @property
+    def metres_per_unit(self) -> float:
+        """How long a unit of this drive's self-motion is believed to be; what is expected beforehand, until views tell."""
+        return math.exp(self._belief.log_scale)
+
     def step(self, observation: Observation) -> LocalizationEstimate:
         """Take one observation in and return the estimate at its time.
 

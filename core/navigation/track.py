@@ -1,0 +1,127 @@
+"""The pose that is steered by: the localizer's pose, corrected by the lane and by what is seen across it.
+
+An extended Kalman filter on (x, y, heading) in the network frame. The localizer's pose is a measurement of little weight, since
+its error changes slowly: what it says again and again is the same error. The lane read from a frame corrects the pose across the
+lane and its heading, a stop line or a junction's mouth corrects it along the lane.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hippodrome.core.reading.types import LaneEnd, RoadReading
+from hippodrome.core.se2 import wrap_compiled
+from hippodrome.core.types import FloatArray
+
+ALONG_SHARE = 0.03  # of each step: what the distance is wrong by, beside the scale's own error
+HEADING_RAD_PER_SQRT_M = 0.003  # random walk of the heading
+SIDE_RAD = 0.005  # drift across per metre
+LOCALIZED_M, LOCALIZED_RAD = (1.5, 0.9), 0.06  # of the localizer's pose along and across: its errors repeat for tens of metres
+LANE_FLOOR_M, LANE_FLOOR_RAD = 0.08, 0.02  # a lane read from a frame is not better than that
+END_FLOOR_M = {LaneEnd.STOP_LINE: 0.4, LaneEnd.MOUTH: 1.0}  # nor where a stop line or a mouth lies
+STOP_LINE_BEFORE_END_M = 0.9  # the near edge of a stop line, before the end of the lane
+GATE = 9.0  # squared standard deviations that a measurement of the lane may be off
+END_GATE_M = 4.0  # and metres that an end of the lane may be off: there is another junction beyond
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """A pose (3,) in the network frame and its covariance (3, 3)."""
+
+    pose: FloatArray
+    covariance: FloatArray
+
+    @property
+    def sigma_m(self) -> float:
+        """Standard deviation of the position, as the root mean square over both axes."""
+        return math.sqrt(max(0.5 * float(self.covariance[0, 0] + self.covariance[1, 1]), 0.0))
+
+
+def begun(pose: FloatArray, covariance: FloatArray) -> Track:
+    """A track that begins at the localizer's pose."""
+    return Track(np.array(pose, dtype=np.float64), np.array(covariance, dtype=np.float64))
+
+
+def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
+    """The track after a short arc."""
+    chord = track.pose[2] + 0.5 * turned_rad
+    step = distance_m * math.cos(chord), distance_m * math.sin(chord)
+    pose = np.array([track.pose[0] + step[0], track.pose[1] + step[1], wrap_compiled(track.pose[2] + turned_rad)])
+    slope = np.eye(3)
+    slope[0, 2], slope[1, 2] = -step[1], step[0]
+    far = abs(distance_m)
+    along, aside = ALONG_SHARE * far, SIDE_RAD * far
+    noise = _turned(pose[2], along**2, aside**2, HEADING_RAD_PER_SQRT_M**2 * far + (0.01 * turned_rad) ** 2)
+    return Track(pose, slope @ track.covariance @ slope.T + noise)
+
+
+def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Track:
+    """The track after the localizer's pose."""
+    noise = covariance + _turned(float(pose[2]), LOCALIZED_M[0] ** 2, LOCALIZED_M[1] ** 2, LOCALIZED_RAD**2)
+    difference = pose - track.pose
+    difference[2] = wrap_compiled(difference[2])
+    gain = np.linalg.solve((track.covariance + noise).T, track.covariance.T).T
+    return _shifted(track, gain @ difference, gain, np.eye(3), noise)
+
+
+def with_lane(
+    track: Track, reading: RoadReading, lane_point_m: FloatArray, lane_heading_rad: float
+) -> tuple[Track, bool]:
+    """The track after the lane was read, and whether the reading fits.
+
+    Args:
+        track: the pose before.
+        reading: what the frame shows.
+        lane_point_m: (2,) the nearest point on the middle of the lane that the vehicle is taken to be in.
+        lane_heading_rad: the lane's direction there.
+    """
+    fits = True
+    if reading.sees_lane:
+        aside = np.array([-math.sin(lane_heading_rad), math.cos(lane_heading_rad), 0.0])
+        expected = float(aside[:2] @ (track.pose[:2] - lane_point_m))
+        variance = reading.offset_variance_m2 + LANE_FLOOR_M**2
+        track, fits = _measured(track, aside, reading.offset_m - expected, variance)
+    if fits and reading.heading_variance_rad2 < math.inf:
+        turned = wrap_compiled(lane_heading_rad + reading.heading_rad - track.pose[2])
+        track, _ = _measured(track, np.array([0.0, 0.0, 1.0]), float(turned), reading.heading_variance_rad2 + LANE_FLOOR_RAD**2)
+    return track, fits
+
+
+def with_end(track: Track, reading: RoadReading, to_end_m: float, lane_heading_rad: float) -> tuple[Track, bool]:
+    """The track after an end of the lane was seen ahead, and whether it fits; ``to_end_m`` is where the track expects it."""
+    if reading.end is LaneEnd.NOTHING or not math.isfinite(reading.end_variance_m2):
+        return track, True
+    seen_m = reading.end_m + (STOP_LINE_BEFORE_END_M if reading.end is LaneEnd.STOP_LINE else 0.0)
+    nearer_m = to_end_m - seen_m  # the vehicle is so much farther along than believed
+    if abs(nearer_m) > END_GATE_M:
+        return track, False
+    along = np.array([math.cos(lane_heading_rad), math.sin(lane_heading_rad), 0.0])
+    return _measured(track, along, nearer_m, reading.end_variance_m2 + END_FLOOR_M[reading.end] ** 2)
+
+
+def _measured(track: Track, row: FloatArray, innovation: float, variance: float) -> tuple[Track, bool]:
+    """A scalar update, and whether the measurement lies within the gate; one that does not is left out."""
+    cross = track.covariance @ row
+    total = float(row @ cross) + variance
+    if innovation**2 > GATE * total:
+        return track, False
+    gain = cross / total
+    return _shifted(track, gain * innovation, gain[:, None], row[None, :], np.array([[variance]])), True
+
+
+def _shifted(track: Track, shift: FloatArray, gain: FloatArray, rows: FloatArray, noise: FloatArray) -> Track:
+    """Joseph's form (I - K H) P (I - K H)^T + K R K^T, which stays symmetric."""
+    pose = track.pose + shift
+    pose[2] = wrap_compiled(pose[2])
+    rest = np.eye(3) - gain @ rows
+    return Track(pose, rest @ track.covariance @ rest.T + gain @ noise @ gain.T)
+
+
+def _turned(heading_rad: float, sq_along: float, sq_across: float, sq_heading: float) -> FloatArray:
+    """A covariance (3, 3) given along and across a heading."""
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    return turn @ np.diag([sq_along, sq_across, sq_heading]) @ turn.T

@@ -1,0 +1,89 @@
+"""Reading the road in one frame."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import cv2
+import numpy as np
+
+from hippodrome.core.reading.arcs import best_arc, fit_arc, line_places
+from hippodrome.core.reading.config import ReaderConfig
+from hippodrome.core.reading.ground import Ground, ground_of
+from hippodrome.core.reading.lane import GRADE, Lines, Place, place_in_lane
+from hippodrome.core.reading.ridges import find_ridges
+from hippodrome.core.reading.traits import line_traits
+from hippodrome.core.reading.types import RoadReading
+from hippodrome.core.types import Float32Array, Frame
+from hippodrome.core.views.egomotion.camera import RoadCamera
+
+LEAST_RIDGES: Final = 8  # fewer tell of no road
+LEAST_ROWS: Final = 12  # frames that show the road in fewer rows are of no use
+
+
+class RoadReader:
+    """Reads the lane in frames of one camera. Between frames it keeps nothing but the width of the lanes that it has seen."""
+
+    def __init__(self, camera: RoadCamera, config: ReaderConfig | None = None) -> None:
+        self._camera, self._config = camera, config or ReaderConfig()
+        self._ground: Ground | None = None
+        self._size_px = (0, 0)
+        self._width_m, self._width_sigma_m = self._config.lane_width_m, self._config.lane_width_sigma_m
+
+    def read(self, frame: Frame) -> RoadReading:
+        """What the frame (H, W, 3) RGB or (H, W) grey says; variances are ``inf`` for all that is not seen."""
+        ground = self._ground_of(frame)
+        if len(ground.rows) < LEAST_ROWS:
+            return RoadReading()
+        grey = self._road(frame, ground)
+        lines = self._lines(grey, ground)
+        place = None if lines is None else place_in_lane(lines, self._width_m, self._width_sigma_m, self._config)
+        if lines is None or place is None or place.variance_m2 > self._config.largest_sigma_m**2:
+            return RoadReading()
+        self._remember(place)
+        return RoadReading(
+            offset_m=-place.middle_m,
+            offset_variance_m2=place.variance_m2,
+            heading_rad=-float(lines.arc[0]),
+            heading_variance_rad2=GRADE**2 * float(lines.covariance[0, 0]),
+            curvature_1pm=float(lines.arc[1]),
+            curvature_variance_1pm2=GRADE**2 * float(lines.covariance[1, 1]),
+            lane_width_m=place.width_m,
+        )
+
+    def _ground_of(self, frame: Frame) -> Ground:
+        size_px = frame.shape[1], frame.shape[0]
+        if self._ground is None or size_px != self._size_px:
+            self._size_px = size_px
+            self._ground = ground_of(self._camera, size_px, self._config.far_m, self._config.paint_m)
+        return self._ground
+
+    def _road(self, frame: Frame, ground: Ground) -> Float32Array:
+        """Brightness (R, W) of the rows that show the road, from the nearest on."""
+        first, last = int(ground.rows[-1]), int(ground.rows[0])
+        part = frame[first : last + 1]
+        grey = part if part.ndim == 2 else cv2.transform(part, np.full((1, 3), 1.0 / 3.0, np.float32))
+        return np.ascontiguousarray(grey[::-1], dtype=np.float32)
+
+    def _lines(self, grey: Float32Array, ground: Ground) -> Lines | None:
+        """The lines along the road."""
+        ridges = find_ridges(grey, ground.x_m, ground.y_m, self._config.line_m)
+        if len(ridges) < LEAST_RIDGES:
+            return None
+        weight = np.ones(len(ridges))
+        arc = best_arc(ridges, weight)
+        places = line_places(ridges, weight, arc)
+        if len(places) == 0:
+            return None
+        arc, covariance, places, about, owner = fit_arc(ridges, arc, places)
+        keep = about[:, 0] > 0.0
+        if not np.all(keep):
+            return None
+        traits = line_traits(grey, ground.x_m, ground.y_m, ridges, owner, arc, places)
+        return Lines(arc, covariance, places, about, traits)
+
+    def _remember(self, place: Place) -> None:
+        if math.isfinite(place.width_m):
+            self._width_m += 0.05 * (place.width_m - self._width_m)
+            self._width_sigma_m = max(0.08, 0.98 * self._width_sigma_m)

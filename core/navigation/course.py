@@ -47,9 +47,7 @@ class Course:
         return STEP_M * (len(self.lane) - 1)
 
 
-def make_course(
-    network: RoadNetwork, pieces: Sequence[Piece], goal_lane: int, goal_m: float, config: DriveConfig
-) -> Course:
+def make_course(network: RoadNetwork, pieces: Sequence[Piece], goal_lane: int, goal_m: float, config: DriveConfig) -> Course:
     """The course over the stretches of lanes of a route that ends at or beyond the goal."""
     path, starts, owner = smooth_path(network, pieces), piece_starts(pieces), piece_of_samples(pieces)
     begin_m = np.array([piece.begin_m for piece in pieces])

@@ -77,9 +77,7 @@ def road_times(network: RoadNetwork, mapped: BoolArray, config: PlanConfig) -> R
     return RoadTimes(network, length_m, time_s + config.u_turn_s * turns_back, tuple(tuple(lanes) for lanes in before))
 
 
-def times_to_goal(
-    roads: RoadTimes, goal_lane: int, goal_m: float, closed: Collection[int], config: PlanConfig
-) -> TimesToGoal:
+def times_to_goal(roads: RoadTimes, goal_lane: int, goal_m: float, closed: Collection[int], config: PlanConfig) -> TimesToGoal:
     """Search back from the goal. ``closed`` are edges (indices into ``edge_ids``) on which nobody gets through."""
     network = roads.network
     shut = np.isin(network.lane_edge, np.array(sorted(closed), dtype=np.int32))

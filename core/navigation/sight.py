@@ -141,7 +141,9 @@ class Ground:
 
 
 @njit(cache=True)
-def _enter(cells: UInt8Array, origin: FloatArray, pose: FloatArray, ahead: FloatArray, left: FloatArray, kind: UInt8Array) -> None:
+def _enter(
+    cells: UInt8Array, origin: FloatArray, pose: FloatArray, ahead: FloatArray, left: FloatArray, kind: UInt8Array
+) -> None:
     """Write pixels into the cells; of one frame, paint counts before all else, and what is no road before road."""
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     n = len(kind)

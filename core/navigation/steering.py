@@ -21,9 +21,7 @@ def path_curvature_1pm(course: Course, u_m: float, pose_m: FloatArray, speed_mps
     return lane_curvature_1pm(at(course.path.curvature_1pm, ahead_m), offset_m, turn_rad, speed_mps, config)
 
 
-def lane_curvature_1pm(
-    curvature_1pm: float, offset_m: float, turn_rad: float, speed_mps: float, config: DriveConfig
-) -> float:
+def lane_curvature_1pm(curvature_1pm: float, offset_m: float, turn_rad: float, speed_mps: float, config: DriveConfig) -> float:
     """The same law where only offset, heading and curvature of a lane are known. Large offsets are closed at a mild angle."""
     decay_m = max(config.error_decay_m, config.error_decay_s * speed_mps)
     offset_m = min(max(offset_m, -1.0), 1.0)

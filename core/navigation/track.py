@@ -67,9 +67,7 @@ def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Tr
     return _shifted(track, gain @ difference, gain, np.eye(3), noise)
 
 
-def with_lane(
-    track: Track, reading: RoadReading, lane_point_m: FloatArray, lane_heading_rad: float
-) -> tuple[Track, bool]:
+def with_lane(track: Track, reading: RoadReading, lane_point_m: FloatArray, lane_heading_rad: float) -> tuple[Track, bool]:
     """The track after the lane was read, and whether the reading fits.
 
     Args:

@@ -1,0 +1,72 @@
+"""How fast the vehicle is, in metres per second, though its odometry counts in units of unknown length.
+
+Before views tell the scale, three things do: what is expected of it, the frames (visual odometry knows the height of the camera), and
+the vehicle itself: in a steered turn the yaw rate is v tan(delta) / L (the single-track model), and the gyro measures it in radians.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from hippodrome.core.navigation.config import VehicleShape
+from hippodrome.core.types import Observation
+
+PRIOR_SIGMA = 0.28  # of ln(scale): two drives differ by a fifth each
+VISUAL_SIGMA, VISUAL_M = 0.06, 12.0  # what visual odometry tells, once it has seen so many metres
+STEERED_SIGMA, STEERED_RAD = 0.03, 0.4  # what turns tell, once the vehicle has turned so much
+LEAST_BEND_1PM = 0.03  # straighter driving tells nothing of the scale
+MEMORY = 0.997  # of the sums, per step of a tenth of a second: the scale wanders over some hundred metres
+WHEEL_RATE_RADPS = 0.9  # how fast the road wheels can be turned
+SPEED_TRUST = 0.25  # weight of one speed measurement: its noise is 6 % at 10 Hz
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What is known of the vehicle's motion."""
+
+    speed_mps: float = 0.0
+    steering_rad: float = 0.0  # where the road wheels stand, as they were told to
+    seen_m: float = 0.0  # sums over the drive: metres by visual odometry, and units by the odometry meanwhile
+    seen_units: float = 0.0
+    turned: float = 0.0  # sum of yaw rate times what a unit turns: numerator of the least-squares scale
+    turning: float = 0.0  # sum of the squares of the latter
+    turned_rad: float = 0.0  # how much was turned in all, up to a bound
+
+    def metres_per_unit(self, expected: float) -> float:
+        """The scale: a mean of ln(scale) by what is expected, frames and turns, each with its weight."""
+        total, weight = math.log(expected) / PRIOR_SIGMA**2, 1.0 / PRIOR_SIGMA**2
+        if self.seen_m > 1.0 and self.seen_units > 0.0:
+            trust = min(self.seen_m / VISUAL_M, 1.0) / VISUAL_SIGMA**2
+            total, weight = total + trust * math.log(self.seen_m / self.seen_units), weight + trust
+        if self.turned > 0.0 and self.turning > 0.0:
+            trust = min(self.turned_rad / STEERED_RAD, 1.0) ** 2 / STEERED_SIGMA**2
+            total, weight = total + trust * math.log(self.turned / self.turning), weight + trust
+        return math.exp(total / weight)
+
+
+def sensed(
+    motion: Motion, observation: Observation, seen_mps: float | None, metres_per_unit: float, vehicle: VehicleShape
+) -> Motion:
+    """The motion after an observation; ``seen_mps`` is the speed by visual odometry, where that runs."""
+    dt_s, units = observation.dt_s, observation.speed * observation.dt_s
+    speed = metres_per_unit * observation.speed
+    smooth = speed if speed == 0.0 else motion.speed_mps + SPEED_TRUST * (speed - motion.speed_mps)
+    bend = math.tan(motion.steering_rad) / vehicle.wheelbase_m
+    seen_m, seen_units = MEMORY * motion.seen_m, MEMORY * motion.seen_units
+    if seen_mps is not None and observation.speed > 0.0:
+        seen_m, seen_units = seen_m + max(seen_mps, 0.0) * dt_s, seen_units + units
+    turned, turning, turned_rad = motion.turned, motion.turning, motion.turned_rad
+    if abs(bend) > LEAST_BEND_1PM and units > 0.0:
+        turned = MEMORY * turned + observation.yaw_rate_radps * dt_s * bend * units
+        turning = MEMORY * turning + (bend * units) ** 2
+        turned_rad = min(turned_rad + abs(observation.yaw_rate_radps) * dt_s, 1.0)
+    return Motion(max(smooth, 0.0), motion.steering_rad, seen_m, seen_units, turned, turning, turned_rad)
+
+
+def commanded(motion: Motion, acceleration_mps2: float, steering_rad: float, dt_s: float) -> Motion:
+    """The motion as a command makes it: the wheels turn as fast as they can, the speed changes as it was told to."""
+    most = WHEEL_RATE_RADPS * dt_s
+    wheels = motion.steering_rad + min(max(steering_rad - motion.steering_rad, -most), most)
+    speed = max(motion.speed_mps + acceleration_mps2 * dt_s, 0.0)
+    return Motion(speed, wheels, motion.seen_m, motion.seen_units, motion.turned, motion.turning, motion.turned_rad)

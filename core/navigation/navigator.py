@@ -1,0 +1,280 @@
+"""The navigator: from what the vehicle senses to what it does, on its own map and to a goal, from an unknown start.
+
+Each step passes through it from top to bottom: the sensors are watched, the localizer is asked, the lane is read, the pose that is
+steered by is corrected, and then one of the states of ``DrivingState`` decides:
+
+    SEARCHING  no fix: on sight along the border of the own side (``searching``), until the localizer knows the place
+    DRIVING    on the course of the plan (``pilot``, ``driving``, ``steering``)
+    DOUBTING   the same, slowly, while the localizer doubts the place; after some way without its consent: searching
+    HALTED     a sensor has failed, or no way leads to the goal: stands, and says why
+    ARRIVED    stands at the goal, whose place is known well
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from hippodrome.core.localization.localizer import Localizer
+from hippodrome.core.navigation import motion as motions
+from hippodrome.core.navigation import track as tracks
+from hippodrome.core.navigation.config import NavigatorConfig
+from hippodrome.core.navigation.driving import pace
+from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
+from hippodrome.core.navigation.placing import keeps_left, lane_of, lane_that_is_read
+from hippodrome.core.navigation.searching import search_step
+from hippodrome.core.navigation.sight import Ground
+from hippodrome.core.navigation.speed import approach_mps2, following_mps2
+from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
+from hippodrome.core.navigation.track import Track
+from hippodrome.core.navigation.types import Command, DrivingState, Goal, Indicator, Lamp, Radar
+from hippodrome.core.navigation.watch import SensorHealth, is_dark, watched
+from hippodrome.core.reading.reader import RoadReader
+from hippodrome.core.reading.types import RoadReading
+from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.types import CognitiveMap, LocalizationEstimate, Observation
+from hippodrome.core.views.odometry import VisualOdometry
+
+__all__ = ["Navigator", "NavigatorConfig"]
+
+LOOK_EVERY_S = 0.4  # the localizer's pose is taken in so often: its looks are as frequent
+APART_M, APART_SIGMAS, APART_S = 4.0, 3.5, 1.0  # the localizer has gone elsewhere: so far off, for so long
+FORGOTTEN_M = 40.0  # driven without a fix of the localizer, the pose that was steered by is given up
+STANDING_MPS = 0.1
+HOLD_MPS2 = -1.0  # what holds a vehicle that stands
+OBSTACLE_M = 10.0  # who stands nearer than this before something waits for it
+ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
+
+
+class Navigator:
+    """Drives to a goal on a topometric map: ``set_goal``, then ``step`` with what is sensed, ten times a second.
+
+    Args:
+        cognitive_map: a refined map, in the network frame.
+        network: the road network of the map.
+        config: all parameters.
+
+    Raises:
+        HippodromeError: the map cannot be localized in.
+    """
+
+    def __init__(self, cognitive_map: CognitiveMap, network: RoadNetwork, config: NavigatorConfig = NavigatorConfig()) -> None:
+        self._config = config
+        self._localizer = Localizer(cognitive_map, network, config.localizer)
+        self._planner = RoutePlanner(cognitive_map, network, config)
+        self._side = 1.0 if keeps_left(self._planner.roads) else -1.0
+        self._reader: RoadReader | None = None
+        self._odometry: VisualOdometry | None = VisualOdometry(config.camera)
+        self._ground = Ground(config.camera)
+        self._motion, self._health = motions.Motion(), SensorHealth()
+        self._expected_scale = self._localizer.metres_per_unit
+        self._reading: RoadReading | None = None
+        self._track: Track | None = None
+        self._plan: Plan | None = None
+        self._has_goal = False
+        self._since_look_s = self._apart_s = self._standing_s = self._at_goal_s = 0.0
+        self._since_fix_m, self._unfixed_m = 0.0, 0.0
+        self._arrived = False
+        self.estimate: LocalizationEstimate | None = None  # the localizer's last answer, for who looks on
+
+    def set_goal(self, goal: Goal) -> None:
+        """Drive to ``goal`` from now on. Raises HippodromeError if it lies on no lane of its direction."""
+        self._planner.set_goal(goal)
+        self._has_goal, self._arrived, self._plan = True, False, None
+
+    @property
+    def track(self) -> Track | None:
+        """The pose that is steered by; None without a fix."""
+        return self._track
+
+    @property
+    def plan(self) -> Plan | None:
+        """The plan under way."""
+        return self._plan
+
+    def step(self, observation: Observation, radar: Radar = Radar()) -> Command:
+        """What to do over the next step, after what was sensed in the last one."""
+        config, dt_s = self._config, observation.dt_s
+        self._health = watched(
+            self._health, observation, radar, self._motion.speed_mps, self._motion.steering_rad, config.watch, config.vehicle
+        )
+        if observation.frame is not None and is_dark(observation.frame, config.watch.dark_level):
+            observation = replace(observation, frame=None)
+        self.estimate = self._localizer.step(observation)
+        distance_m = self._move(observation, radar)
+        self._read(observation)
+        self._follow_localizer(distance_m, dt_s)
+        self._correct_by_lane(observation)
+        command = self._decide(radar, dt_s)
+        self._motion = motions.commanded(self._motion, command.acceleration_mps2, command.steering_rad, dt_s)
+        return command
+
+    def _move(self, observation: Observation, radar: Radar) -> float:
+        """Take the self-motion in: the metres that were driven."""
+        config = self._config
+        known = self.estimate is not None and self.estimate.localized
+        scale = self._localizer.metres_per_unit if known else self._motion.metres_per_unit(self._expected_scale)
+        seen_mps = None
+        if self._odometry is not None:
+            seen_mps = self._odometry.step(observation).speed
+            self._odometry = None if known else self._odometry  # it costs more than all else, and is not needed any more
+        self._motion = motions.sensed(self._motion, observation, seen_mps, scale, config.vehicle)
+        distance_m = scale * observation.speed * observation.dt_s
+        turned_rad = observation.yaw_rate_radps * observation.dt_s
+        self._ground.move(distance_m, turned_rad)
+        if observation.frame is not None:
+            self._ground.see(observation.frame, radar.gap_m)
+        if self._track is not None:
+            self._track = tracks.moved(self._track, distance_m, turned_rad)
+        self._since_fix_m += distance_m
+        return distance_m
+
+    def _read(self, observation: Observation) -> None:
+        """Read the lane in a new frame; between frames there is no reading."""
+        self._reading = None
+        if observation.frame is not None and self._config.read_road:
+            if self._reader is None:
+                size_px = observation.frame.shape[1], observation.frame.shape[0]
+                self._reader = RoadReader(self._config.camera.on_road(*size_px))
+            self._reading = self._reader.read(observation.frame)
+
+    def _follow_localizer(self, distance_m: float, dt_s: float) -> None:
+        """Begin, correct, or give up the pose that is steered by, as the localizer says."""
+        estimate = self.estimate
+        assert estimate is not None
+        self._since_look_s += dt_s
+        self._unfixed_m = 0.0 if estimate.localized else self._unfixed_m + distance_m
+        if self._track is not None and self._unfixed_m > FORGOTTEN_M:
+            self._track, self._plan = None, None
+        if not estimate.localized:
+            return
+        if self._track is None:
+            self._restart(estimate)
+            return
+        apart_m = float(np.hypot(*(estimate.pose[:2] - self._track.pose[:2])))
+        turned = abs(math.remainder(float(estimate.pose[2] - self._track.pose[2]), 2.0 * math.pi))
+        sigma_m = self._track.sigma_m + math.sqrt(max(0.5 * float(np.trace(estimate.covariance[:2, :2])), 0.0))
+        elsewhere = apart_m > max(APART_M, APART_SIGMAS * sigma_m) or turned > 0.5
+        self._apart_s = self._apart_s + dt_s if elsewhere else 0.0
+        if self._apart_s > APART_S:
+            self._restart(estimate)
+        elif not elsewhere and self._since_look_s >= LOOK_EVERY_S and distance_m > 0.0:
+            self._track = tracks.with_localizer(self._track, estimate.pose, estimate.covariance)
+            self._since_look_s = 0.0
+
+    def _restart(self, estimate: LocalizationEstimate) -> None:
+        self._track, self._plan = tracks.begun(estimate.pose, estimate.covariance), None
+        self._apart_s = self._since_fix_m = 0.0
+
+    def _correct_by_lane(self, observation: Observation) -> None:
+        """Correct the pose by the lane, where the vehicle is on one that is no way through a junction."""
+        if self._track is None:
+            return
+        if self._plan is not None:
+            self._plan = advanced(self._plan, self._track.pose)
+        reading = self._reading
+        if reading is None or observation.speed == 0.0:
+            return
+        place = self._planner.lane_place(self._plan, self._track.pose)
+        network = self._planner.roads.network
+        if place is None or network.is_internal[place.lane]:
+            return
+        read = lane_that_is_read(self._planner.roads, self._track.pose, place, reading) if reading.sees_lane else place
+        left = np.array([-math.sin(read.heading_rad), math.cos(read.heading_rad)])
+        point_m = self._track.pose[:2] - read.offset_m * left
+        self._track, _ = tracks.with_lane(self._track, reading, point_m, read.heading_rad)
+        if not len(network.successors(place.lane)) or network.is_internal[network.successors(place.lane)].any():
+            to_end_m = float(self._planner.roads.lane_length_m[place.lane]) - place.position_m
+            self._track, _ = tracks.with_end(self._track, reading, to_end_m, read.heading_rad)
+
+    def _decide(self, radar: Radar, dt_s: float) -> Command:
+        """The command of the present state."""
+        halt, complaint = self._health.complaint(self._config.watch)
+        if not self._has_goal:
+            return self._standing(DrivingState.HALTED, "has no goal")
+        if self._arrived:
+            return self._standing(DrivingState.ARRIVED, "has arrived")
+        self._keep_plan()
+        command = self._searching(radar) if self._plan is None else self._driving(radar, dt_s)
+        if complaint:
+            limit = 0.0 if halt else self._config.drive.search_mps / 2.0
+            slowed = min(command.acceleration_mps2, self._config.drive.speed_gain_1ps * (limit - self._motion.speed_mps))
+            state = DrivingState.HALTED if halt else DrivingState.DOUBTING
+            command = replace(command, acceleration_mps2=max(slowed, -3.0), state=state, reason=complaint)
+        self._look_for_blockage(radar, dt_s)
+        return command
+
+    def _keep_plan(self) -> None:
+        """Make a plan where there is none and there can be one; drop one that was missed."""
+        if self._track is None:
+            self._plan = None
+            return
+        if self._plan is not None and is_missed(self._plan, self._track.pose):
+            self._plan = None
+        if self._plan is None and lane_of(self._planner.roads, self._track.pose) is not None:
+            self._plan = self._planner.plan(self._track.pose, self._motion.speed_mps)
+
+    def _searching(self, radar: Radar) -> Command:
+        """On sight along the border."""
+        config, speed = self._config, self._motion.speed_mps
+        step = search_step(self._ground, self._reading, radar, self._side, speed, config.drive, config.vehicle)
+        accel = min(
+            approach_mps2(speed, step.speed_mps, config.drive), following_mps2(speed, radar, config.drive, config.vehicle)
+        )
+        wheel = steering_rad(step.curvature_1pm, speed, config.drive, config.vehicle)
+        return Command(accel, wheel, step.indicator, DrivingState.SEARCHING, step.reason)
+
+    def _driving(self, radar: Radar, dt_s: float) -> Command:
+        """On the course."""
+        assert self._plan is not None and self._track is not None and self.estimate is not None
+        config, speed, plan = self._config, self._motion.speed_mps, self._plan
+        step = pace(plan.course, plan.u_m, speed, radar, self._track.sigma_m, config.drive, config.vehicle)
+        wanted, reason, state = step.speed_mps, step.reason, DrivingState.DRIVING
+        if not self.estimate.localized:
+            state = DrivingState.DOUBTING
+            if config.drive.doubt_mps < wanted:
+                wanted, reason = config.drive.doubt_mps, "doubts its place"
+        if plan.to_goal_m < config.drive.goal_tolerance_m and speed < STANDING_MPS:
+            return self._at_goal(dt_s)
+        accel = min(approach_mps2(speed, wanted, config.drive), following_mps2(speed, radar, config.drive, config.vehicle))
+        if wanted <= 0.0 and speed < STANDING_MPS:
+            accel = HOLD_MPS2
+        bend = path_curvature_1pm(plan.course, plan.u_m, self._track.pose, speed, config.drive)
+        wheel = steering_rad(bend, speed, config.drive, config.vehicle)
+        return Command(accel, wheel, step.indicator, state, reason)
+
+    def _at_goal(self, dt_s: float) -> Command:
+        """Stands at the goal: says so if the place is known well, and else goes round once more."""
+        assert self._track is not None and self.estimate is not None
+        drive = self._config.drive
+        self._at_goal_s += dt_s
+        if self.estimate.localized and self._track.sigma_m < drive.goal_sigma_m and self._since_fix_m > drive.settled_m:
+            self._arrived = True
+            return self._standing(DrivingState.ARRIVED, "has arrived")
+        if self._at_goal_s > ROUND_AGAIN_S:
+            self._at_goal_s = 0.0
+            self._plan = self._planner.plan(self._track.pose, 0.0, beyond_goal=True)
+        return self._standing(DrivingState.DOUBTING, "cannot vouch for the goal's place")
+
+    def _look_for_blockage(self, radar: Radar, dt_s: float) -> None:
+        """A road counts as closed where the vehicle has stood long before something, though no lamp is red."""
+        waits = radar.gap_m < OBSTACLE_M and radar.lamp not in (Lamp.RED, Lamp.YELLOW) and not radar.blind
+        standing = self._motion.speed_mps < STANDING_MPS
+        self._standing_s = self._standing_s + dt_s if standing and waits else 0.0
+        if self._plan is None or self._track is None or self._standing_s < self._config.drive.blocked_s:
+            return
+        self._standing_s = 0.0
+        gate = self._plan.gate()
+        if gate is not None and gate.edge >= 0 and gate.entry_u_m - self._plan.u_m < OBSTACLE_M + self._config.vehicle.front_m:
+            self._planner.close(gate.edge)
+            self._plan = self._planner.plan(self._track.pose, 0.0)
+            if self._plan is None:
+                self._planner.open_all()
+
+    def _standing(self, state: DrivingState, reason: str) -> Command:
+        """Stop, and stand."""
+        firm = self._config.drive.braking_mps2
+        accel = HOLD_MPS2 if self._motion.speed_mps < STANDING_MPS else -firm
+        return Command(accel, self._motion.steering_rad, Indicator.STRAIGHT, state, reason)

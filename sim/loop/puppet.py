@@ -1,0 +1,89 @@
+"""The ego as SUMO knows it: moved by us, with a route and an indicator that others can see, and never lost."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import libsumo
+
+from hippodrome.core.navigation.types import Indicator
+from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M
+from hippodrome.sim.loop.car import ahead_of
+from hippodrome.sim.loop.ways import Way, Ways
+from hippodrome.sim.sumo_run import EGO
+
+KEEP_ROUTE: Final = 2  # SUMO's word for: wherever it is, also off its route and off the road
+SIGNALS: Final = {Indicator.RIGHT: 1, Indicator.STRAIGHT: 0, Indicator.LEFT: 2}  # SUMO's bits of the blinkers
+
+
+class Puppet:
+    """Moves SUMO's ego to where the bicycle is, before each of SUMO's steps."""
+
+    def __init__(self, network: RoadNetwork, ways: Ways) -> None:
+        self._network, self._ways = network, ways
+        self._route: tuple[str, ...] = ()
+        self._routes = 0
+        self.put_back = 0  # how often SUMO had taken the ego off the road
+
+    def place(
+        self, pose_m: tuple[float, float, float], speed_mps: float, lane: int, before: int, indicator: Indicator
+    ) -> Way | None:
+        """Puts the ego where it is.
+
+        Args:
+            pose_m: of the rear axle.
+            speed_mps: what others believe.
+            lane: that the front bumper is on, -1 off the road.
+            before: the last lane outside of junctions that it was on.
+            indicator: what it means to do ahead.
+
+        Returns:
+            The way through the junction ahead that lane and indicator mean; None off the road, and where none leads on.
+        """
+        way, route = self._plan(lane, before, indicator)
+        if EGO not in libsumo.vehicle.getIDList():
+            self._insert(route)
+        elif route and route != self._route:
+            self._reroute(route)
+        x, y = ahead_of(pose_m, REAR_AXLE_TO_FRONT_M)
+        edge, _, number = self._network.lane_ids[lane].rpartition("_") if lane >= 0 else ("", "", "-1")
+        angle = 90.0 - math.degrees(pose_m[2])
+        libsumo.vehicle.moveToXY(EGO, edge, int(number), x, y, angle, KEEP_ROUTE)
+        libsumo.vehicle.setSpeed(EGO, speed_mps)
+        libsumo.vehicle.setSignals(EGO, SIGNALS[indicator])
+        return way
+
+    def _plan(self, lane: int, before: int, indicator: Indicator) -> tuple[Way | None, tuple[str, ...]]:
+        """The way ahead, and the edges that SUMO is told."""
+        network = self._network
+        if lane < 0:
+            return None, ()
+        if network.is_internal[lane]:
+            onward = self._ways.out_of(lane)
+            if before < 0 or not onward:
+                return None, ()
+            edges = [int(network.lane_edge[before]), *self._ways.edges_from(onward[0].target)]
+            return None, tuple(network.edge_ids[edge] for edge in edges)
+        way = self._ways.meant(lane, indicator)
+        edges = [int(network.lane_edge[lane]), *(self._ways.edges_from(way.target) if way else ())]
+        return way, tuple(network.edge_ids[edge] for edge in edges)
+
+    def _insert(self, route: tuple[str, ...]) -> None:
+        """Sends the ego on its way; it is on the road as soon as it has been moved there."""
+        self._routes += 1
+        self._route = route or self._route
+        libsumo.route.add(f"ego-{self._routes}", list(self._route))
+        if EGO in libsumo.simulation.getPendingVehicles():
+            libsumo.vehicle.remove(EGO)
+        libsumo.vehicle.add(EGO, f"ego-{self._routes}", typeID="ego", departLane="best", departPos="base")
+        self.put_back += self._routes > 1
+
+    def _reroute(self, route: tuple[str, ...]) -> None:
+        """Tells SUMO where the ego goes. Where the ego is not on that route in SUMO's eyes, it is told at a later step."""
+        try:
+            libsumo.vehicle.setRoute(EGO, list(route))
+            self._route = route
+        except libsumo.TraCIException:
+            self._route = ()

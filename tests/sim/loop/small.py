@@ -1,0 +1,46 @@
+"""Small towns, and a driver who knows the truth, for the tests of the loop."""
+
+import math
+
+from hippodrome.core.navigation.types import Indicator
+from hippodrome.sim.scenario import Scenario
+
+GRID = {"kind": "grid", "width_m": 150, "height_m": 150, "road_km": 1.0}
+
+
+def scenario(vehicles=0, noise="paper", town=None, **other):
+    return Scenario.model_validate(
+        {
+            "name": "loop",
+            "seed": 3,
+            "town": town or GRID,
+            "noise": noise,
+            "mapping": {"tour": {"length_m": 800}},
+            "localization": {"tour": {"length_m": 500}, "traffic": {"vehicles": vehicles}},
+            **other,
+        }
+    )
+
+
+def keeper(world, sensed, indicator=Indicator.STRAIGHT, speed_mps=6.0, gap_m=3.0):
+    """A command that keeps the lane's middle by pure pursuit of the truth, and stands behind whoever is ahead."""
+    truth, ground = sensed.truth, world.ground
+    reach_m, lane = truth.lane_position_m + 4.0 + 0.5 * truth.speed_mps, truth.lane
+    while lane >= 0 and reach_m > ground.lane_length_m(lane):
+        reach_m -= ground.lane_length_m(lane)
+        lane = next_lane(world, lane, indicator)
+    x, y, _ = ground.pose_at(lane, reach_m)
+    dx, dy = x - truth.x_m, y - truth.y_m
+    cos, sin = math.cos(truth.heading_rad), math.sin(truth.heading_rad)
+    forward, left = cos * dx + sin * dy, cos * dy - sin * dx
+    curvature = 2.0 * left / (forward**2 + left**2)
+    room = max(sensed.radar.gap_m - gap_m, 0.0)
+    speed = min(speed_mps, math.sqrt(2.0 / max(abs(curvature), 1e-3)), math.sqrt(3.0 * room) if room < 1e3 else 99.0)
+    return min(2.0, 2.0 * (speed - truth.speed_mps)), math.atan(2.7 * curvature)
+
+
+def next_lane(world, lane, indicator):
+    if world.network.is_internal[lane]:
+        return int(world.network.successors(lane)[0])
+    way = world.ways.meant(lane, indicator)
+    return (*way.inside, way.target)[0]

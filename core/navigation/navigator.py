@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, LocalizationEstimate, Observation
 from hippodrome.core.views.odometry import VisualOdometry
 
-__all__ = ["Navigator", "NavigatorConfig"]
+__all__ = ["Navigator", "NavigatorConfig", "PoseSource"]
 
 LOOK_EVERY_S = 0.4  # the localizer's pose is taken in so often: its looks are as frequent
 APART_M, APART_SIGMAS, APART_S = 4.0, 3.5, 1.0  # the localizer has gone elsewhere: so far off, for so long
@@ -48,6 +49,17 @@ OBSTACLE_M = 10.0  # who stands nearer than this before something waits for it
 ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
 
 
+class PoseSource(Protocol):
+    """What tells the pose: the localizer, or in experiments something else in its place."""
+
+    @property
+    def metres_per_unit(self) -> float:
+        """Length of the odometry's unit."""
+
+    def step(self, observation: Observation, /) -> LocalizationEstimate:
+        """The estimate after an observation."""
+
+
 class Navigator:
     """Drives to a goal on a topometric map: ``set_goal``, then ``step`` with what is sensed, ten times a second.
 
@@ -55,14 +67,21 @@ class Navigator:
         cognitive_map: a refined map, in the network frame.
         network: the road network of the map.
         config: all parameters.
+        poses: what tells the pose; None: a ``Localizer`` in the map, which is what there is on a road.
 
     Raises:
         HippodromeError: the map cannot be localized in.
     """
 
-    def __init__(self, cognitive_map: CognitiveMap, network: RoadNetwork, config: NavigatorConfig = NavigatorConfig()) -> None:
+    def __init__(
+        self,
+        cognitive_map: CognitiveMap,
+        network: RoadNetwork,
+        config: NavigatorConfig = NavigatorConfig(),
+        poses: PoseSource | None = None,
+    ) -> None:
         self._config = config
-        self._localizer = Localizer(cognitive_map, network, config.localizer)
+        self._localizer: PoseSource = Localizer(cognitive_map, network, config.localizer) if poses is None else poses
         self._planner = RoutePlanner(cognitive_map, network, config)
         self._side = 1.0 if keeps_left(self._planner.roads) else -1.0
         self._reader: RoadReader | None = None

@@ -2,7 +2,8 @@
 
 With the direction ``a`` of the lane at the rear axle and its curvature ``k``, a point that lies ``t`` along that direction and
 ``n`` to the left of it lies on the circle that passes the axle at ``c = (2 n - k (t^2 + n^2)) / (1 + sqrt(1 - 2 k n + k^2 (t^2 + n^2)))``
-to its left. Points of one line share one ``c``.
+to its left. Points of one line share one ``c``. Roads that begin to bend need the change of curvature ``k'`` along the lane too,
+which takes ``k' t^3 / 6`` from ``c``.
 """
 
 from __future__ import annotations
@@ -19,9 +20,16 @@ BENDS: Final = np.array([-0.08, -0.045, -0.02, 0.0, 0.02, 0.045, 0.08])  # curva
 BIN_M, SIDE_M = 0.12, 6.0  # of the histogram of c
 MOST_TRIED: Final = 160  # ridges that are tried: more of them change nothing
 ANGLE_SIGMA, BEND_SIGMA = 0.25, 0.04  # of lanes' directions (rad) and curvatures (1/m), known beforehand
+PRIOR: Final = np.array(
+    [0.08, BEND_SIGMA, 0.015]
+)  # of the vehicle in its lane: it mostly heads along it; change of curvature (1/m^2)
+STEADY_1PM2: Final = 0.0005  # the same on a road that does not bend
+GRADE: Final = 2.0  # standard deviations seem this many times too small: neighbouring rows err together
+SHARPEST_1PM: Final = 0.15
+FIRST_GATE_M, GATE_SHRINKS, LEAST_GATE_M = 0.35, 0.7, 0.12  # distance from its line from which on a ridge is none of it
 ITERATIONS: Final = 6
 LINE_COUNT: Final = 6  # most lines that are fitted together
-LEAST_WEIGHT: Final = 4.0  # ridges that make a line
+LEAST_WEIGHT: Final = 5.0  # ridges that make a line
 APART_M: Final = 0.45  # lines of one road lie farther apart
 PIXEL_SIGMA: Final = 0.3  # error of a ridge's place in pixels
 PLACE_SIGMA_M: Final = 0.02  # and in metres: lines are painted in straight pieces
@@ -99,73 +107,102 @@ def line_places(ridges: FloatArray, weight: FloatArray, arc: FloatArray) -> Floa
 
 @numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
 def fit_arc(
-    ridges: FloatArray, arc: FloatArray, places: FloatArray
+    ridges: FloatArray, trust: FloatArray, start: FloatArray, places: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Least squares over direction, curvature and the lines' places, with ridges far from their line left out.
+    """Least squares over direction, curvature, its change and the lines' places; ridges far from their line are left out.
 
-    Returns the arc (2,), its covariance (2, 2), the places (K,), for each line its information and mean derivatives by
-    direction and curvature (K, 3), and the line of each ridge (N,), -1 for none.
+    Returns the arc (3,), its covariance (3, 3), the places (K,), for each line its information and mean derivatives by the arc
+    (K, 4), and the line of each ridge (N,), -1 for none. All variances are those of ridges that err independently.
     """
     count, lines = len(ridges), len(places)
-    arc, places = arc.copy(), places.copy()
+    arc, places = np.array([start[0], start[1], 0.0]), places.copy()
     owner = np.full(count, -1.0)
-    sums = np.zeros((lines, 4))  # weight, c, dc/d direction, dc/d curvature
-    value, by_angle, by_bend, weight = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
-    covariance = np.zeros((2, 2))
+    sums = np.zeros((lines, 5))  # weight, and weighted: place, its derivatives by the arc
+    value, weight, by = np.empty(count), np.empty(count), np.empty((count, 3))
+    covariance, step, normal, right = np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3)), np.zeros(3)
     for iteration in range(ITERATIONS):
-        gate = max(0.12, 0.35 * 0.7**iteration)
+        gate = max(LEAST_GATE_M, FIRST_GATE_M * GATE_SHRINKS**iteration)
         sin, cos = np.sin(arc[0]), np.cos(arc[0])
         sums[:] = 0.0
         for i in range(count):
             x, y = ridges[i, 0], ridges[i, 1]
             t, n = cos * x + sin * y, cos * y - sin * x
-            value[i] = lateral_m(x, y, sin, cos, arc[1])
-            by_angle[i] = -t
-            by_bend[i] = -0.5 * (t * t + n * n)
-            swerve = SWERVE_1PM * max(x - NEAR_M, 0.0) ** 2
+            value[i] = lateral_m(x, y, sin, cos, arc[1]) - arc[2] * t**3 / 6.0
+            by[i, 0], by[i, 1], by[i, 2] = -t, -0.5 * (t * t + n * n), -(t**3) / 6.0
+            swerve = SWERVE_1PM * (max(x - NEAR_M, 0.0) + max(-x, 0.0)) ** 2
             variance = (PIXEL_SIGMA * ridges[i, 2]) ** 2 + PLACE_SIGMA_M**2 + swerve**2
             reach = gate + 2.0 * swerve
-            owner[i] = -1.0
-            weight[i] = 0.0
+            owner[i], weight[i] = -1.0, 0.0
             for k in range(lines):
                 error = abs(value[i] - places[k])
                 if error < reach:
                     owner[i] = k
-                    weight[i] = (1.0 - (error / reach) ** 2) ** 2 / variance
+                    weight[i] = trust[i] * (1.0 - (error / reach) ** 2) ** 2 / variance
                     sums[k, 0] += weight[i]
                     sums[k, 1] += weight[i] * value[i]
-                    sums[k, 2] += weight[i] * by_angle[i]
-                    sums[k, 3] += weight[i] * by_bend[i]
+                    for j in range(3):
+                        sums[k, 2 + j] += weight[i] * by[i, j]
                     break
-        a = 1.0 / ANGLE_SIGMA**2
-        b = 0.0
-        d = 1.0 / BEND_SIGMA**2
-        e, f = -a * arc[0], -d * arc[1]
+        normal[:] = 0.0
+        for j in range(3):
+            normal[j, j] = 1.0 / PRIOR[j] ** 2
+            right[j] = -arc[j] / PRIOR[j] ** 2
         for i in range(count):
             k = int(owner[i])
             if k < 0 or sums[k, 0] <= 0.0:
                 continue
-            p = by_angle[i] - sums[k, 2] / sums[k, 0]
-            q = by_bend[i] - sums[k, 3] / sums[k, 0]
             r = value[i] - sums[k, 1] / sums[k, 0]
-            a += weight[i] * p * p
-            b += weight[i] * p * q
-            d += weight[i] * q * q
-            e -= weight[i] * p * r
-            f -= weight[i] * q * r
-        determinant = a * d - b * b
-        covariance[0, 0], covariance[1, 1] = d / determinant, a / determinant
-        covariance[0, 1] = covariance[1, 0] = -b / determinant
-        turn, bend = (d * e - b * f) / determinant, (a * f - b * e) / determinant
-        arc[0] += turn
-        arc[1] = min(max(arc[1] + bend, -0.15), 0.15)
+            for j in range(3):
+                p = by[i, j] - sums[k, 2 + j] / sums[k, 0]
+                right[j] -= weight[i] * p * r
+                for m in range(3):
+                    normal[j, m] += weight[i] * p * (by[i, m] - sums[k, 2 + m] / sums[k, 0])
+        _invert(normal, covariance)
+        for j in range(3):
+            step[j] = covariance[j, 0] * right[0] + covariance[j, 1] * right[1] + covariance[j, 2] * right[2]
+            arc[j] += step[j]
+        arc[1] = min(max(arc[1], -SHARPEST_1PM), SHARPEST_1PM)
         for k in range(lines):
             if sums[k, 0] > 0.0:
-                places[k] = (sums[k, 1] + turn * sums[k, 2] + bend * sums[k, 3]) / sums[k, 0]
-    about = np.zeros((lines, 3))
+                places[k] = (sums[k, 1] + step[0] * sums[k, 2] + step[1] * sums[k, 3] + step[2] * sums[k, 4]) / sums[k, 0]
+    about = np.zeros((lines, 4))
     for k in range(lines):
         if sums[k, 0] > 0.0:
             about[k, 0] = sums[k, 0]
-            about[k, 1] = sums[k, 2] / sums[k, 0]
-            about[k, 2] = sums[k, 3] / sums[k, 0]
+            for j in range(3):
+                about[k, 1 + j] = sums[k, 2 + j] / sums[k, 0]
+    _steady(arc, covariance, places, about)
     return arc, covariance, places, about, owner
+
+
+@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+def _invert(matrix: FloatArray, inverse: FloatArray) -> None:
+    """Inverse of a symmetric positive definite (3, 3) matrix."""
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for m in range(3):
+            p, q = (m + 1) % 3, (m + 2) % 3
+            inverse[m, i] = matrix[j, p] * matrix[k, q] - matrix[j, q] * matrix[k, p]
+    determinant = matrix[0, 0] * inverse[0, 0] + matrix[0, 1] * inverse[1, 0] + matrix[0, 2] * inverse[2, 0]
+    inverse /= determinant
+
+
+@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+def _steady(arc: FloatArray, covariance: FloatArray, places: FloatArray, about: FloatArray) -> None:
+    """Take curvature as steady as the ridges allow: most roads are straight, or bend evenly, for as far as one sees.
+
+    The change of curvature is drawn towards none, with the variance of such changes that this one frame suggests.
+    """
+    own = GRADE**2 * covariance[2, 2]
+    usual = max(STEADY_1PM2**2, arc[2] ** 2 - own) / GRADE**2
+    total = covariance[2, 2] + usual
+    gain = covariance[:, 2] / total
+    error = -arc[2]
+    for j in range(3):
+        arc[j] += gain[j] * error
+    for k in range(len(places)):
+        places[k] += error * (gain[0] * about[k, 1] + gain[1] * about[k, 2] + gain[2] * about[k, 3])
+    before = covariance[:, 2].copy()
+    for j in range(3):
+        for m in range(3):
+            covariance[j, m] -= gain[j] * before[m]

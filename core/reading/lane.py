@@ -8,27 +8,35 @@ from typing import Final
 
 import numpy as np
 
+from hippodrome.core.reading.arcs import GRADE
 from hippodrome.core.reading.config import ReaderConfig
 from hippodrome.core.types import FloatArray
 
 NARROWEST_M, WIDEST_M = 2.4, 4.6  # of a lane
 FARTHEST_M: Final = 2.5  # of a lane's border from the axle of a vehicle that is in it
 WIDTH_SPREAD_M: Final = 0.35  # by which lanes differ from the expected width, in the choice of the two borders
-BRIGHTER: Final = 0.28  # log of how much brighter kerb, pavement and gravel are than asphalt ..
-BRIGHTER_SPREAD: Final = 0.06
-LONGER_SPREAD_M: Final = 0.5  # of the length of the longest stretch
-GRADE: Final = 2.0  # standard deviations seem this many times too small: neighbouring rows err together
+BRIGHTER: Final = 0.38  # log of how much brighter kerb, pavement and gravel are than asphalt ..
+BRIGHTER_SPREAD: Final = 0.13  # .. and its spread, also that of one lane's asphalt against the next one's
+LONGER_SPREAD_M: Final = 0.5  # of the length along which a line is seen
+FEW_ROWS: Final = 15.0  # a line seen in fewer rows tells less of its kind
+TOLD_M: Final = 4.5  # after so many metres all that is beside the axle has been ahead of the camera
+ALONG_RAD: Final = 0.2  # a lane in which the vehicle is heads no more aside than this
+BESIDE_M: Final = 0.4  # from the axle along the lane to a piece of its border that lies beside it
+LONGEST_GAP_M: Final = 6.8  # between two dashes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lines:
     """The lines that were fitted together."""
 
-    arc: FloatArray  # (2,) direction of the lane at the rear axle, curvature
-    covariance: FloatArray  # (2, 2)
+    arc: FloatArray  # (3,) direction of the lane at the rear axle, curvature, its change
+    covariance: FloatArray  # (3, 3)
     places_m: FloatArray  # (K,) lateral places at the rear axle
-    about: FloatArray  # (K, 3) information, mean derivative by direction, by curvature
+    about: FloatArray  # (K, 4) information, mean derivatives by the arc
     traits: FloatArray  # (K, 6) as ``line_traits`` tells them
+    ridges: FloatArray  # (N, 5) that were fitted
+    trust: FloatArray  # (N,)
+    owner: FloatArray  # (N,) the line of each, -1 for none
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,28 +48,43 @@ class Place:
     width_m: float
     left: int  # rows of the lines that bound it, -1 for none
     right: int
+    edges: dict[int, float]  # side (1 left, -1 right) -> log odds that the border on it is the edge of the road
 
 
-def edge_probability(lines: Lines, k: int, side: int, config: ReaderConfig) -> float:
-    """How surely a line is the edge of the road, where ``side`` (1 left, -1 right) is its outer side."""
-    _, _, stretch, _, _, ratio = lines.traits[k]
+def edge_odds(lines: Lines, k: int, side: int, config: ReaderConfig) -> float:
+    """Log odds that a line is the edge of the road, where ``side`` (1 left, -1 right) is its outer side."""
+    _, rows, covered, _, _, ratio = lines.traits[k]
+    if rows == 0.0:
+        return 0.0
     brighter = side * math.log(max(ratio, 1e-3))
-    surface = (brighter - BRIGHTER) / BRIGHTER_SPREAD + 2.0
-    longer = (stretch - config.dash_m - 0.8) / LONGER_SPREAD_M
-    return 1.0 / (1.0 + math.exp(-max(min(min(max(surface, -3.0), 3.0) + min(max(longer, -0.5), 4.0), 8.0), -8.0)))
+    surface = BRIGHTER * (2.0 * brighter - BRIGHTER) / (2.0 * BRIGHTER_SPREAD**2)
+    longer = (covered - config.longest_dash_m) / LONGER_SPREAD_M
+    weight = min(rows / FEW_ROWS, 1.0)
+    return float(weight * (min(max(surface, -1.5), 2.5) + min(max(longer, -1.0), 4.0)))
 
 
-def place_in_lane(lines: Lines, width_m: float, width_sigma_m: float, config: ReaderConfig) -> Place | None:
-    """The lane between the two lines that look most like its borders; beside one of them where only one is seen."""
+def _probability(odds: float) -> float:
+    return 1.0 / (1.0 + math.exp(-max(min(odds, 8.0), -8.0)))
+
+
+def place_in_lane(
+    lines: Lines, width_m: float, width_sigma_m: float, told: dict[int, float], config: ReaderConfig
+) -> Place | None:
+    """The lane between the two lines that look most like its borders; beside one of them where only one is seen.
+
+    ``told`` are the log odds that the frames before gave for the border on each side to be the road's edge.
+    """
     best: tuple[float, int, int] | None = None
+    counts = np.bincount(lines.owner[lines.owner >= 0].astype(np.int64), minlength=len(lines.places_m))
     candidates = [k for k in range(len(lines.places_m)) if abs(lines.places_m[k]) < FARTHEST_M]
-    edges = {(k, side): edge_probability(lines, k, side, config) for k in candidates for side in (1, -1)}
+    odds = {(k, side): edge_odds(lines, k, side, config) + told.get(side, 0.0) for k in candidates for side in (1, -1)}
+    edges = {key: _probability(value) for key, value in odds.items()}
     at = {(k, side): float(lines.places_m[k]) + side * config.edge_inset_m * edges[k, side] for k, side in edges}
     for left in [*candidates, -1]:
         for right in [*candidates, -1]:
             if left == right or (left >= 0 and at[left, 1] < 0.0) or (right >= 0 and at[right, -1] > 0.0):
                 continue
-            score = sum(min(float(lines.traits[k, 1]), 25.0) for k in (left, right) if k >= 0)
+            score = sum(min(float(counts[k]), 25.0) for k in (left, right) if k >= 0)
             if left >= 0 and right >= 0:
                 width = at[left, 1] - at[right, -1]
                 if not NARROWEST_M < width < WIDEST_M:
@@ -84,4 +107,26 @@ def place_in_lane(lines: Lines, width_m: float, width_sigma_m: float, config: Re
         variance += (0.5 * width_sigma_m) ** 2
     else:
         width = at[sides[0]] - at[sides[1]]
-    return Place(middle, variance, width, best[1], best[2])
+    return Place(middle, variance, width, best[1], best[2], {side: odds[k, side] for k, side in sides})
+
+
+def beside_the_axle(lines: Lines, place: Place, told_m: float) -> bool:
+    """Whether the rear axle is in the lane that was read, and not yet before it or past its end.
+
+    ``told_m`` is how far back what was seen is known. Without it, a lane that the vehicle heads along is taken to begin behind it.
+    """
+    if abs(float(lines.arc[0])) > ALONG_RAD:
+        return False
+    if told_m < TOLD_M:
+        return True
+    solid, dashed = -math.inf, math.inf
+    for side, k in ((1, place.left), (-1, place.right)):
+        along = np.sort(lines.ridges[lines.owner == k, 0]) if k >= 0 else np.zeros(0)
+        behind, ahead = along[along <= BESIDE_M], along[along > -BESIDE_M]
+        if len(behind) == 0 or len(ahead) == 0:
+            continue
+        gap = max(float(ahead[0] - behind[-1]), 0.0)
+        if place.edges.get(side, 0.0) > 0.0 and gap < 2.0 * BESIDE_M:
+            solid = max(solid, float(ahead[0]))
+        dashed = min(dashed, gap)
+    return solid > -BESIDE_M or dashed < LONGEST_GAP_M

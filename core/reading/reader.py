@@ -8,11 +8,12 @@ from typing import Final
 import cv2
 import numpy as np
 
-from hippodrome.core.reading.arcs import best_arc, fit_arc, line_places
+from hippodrome.core.reading.arcs import GRADE, best_arc, fit_arc, line_places
 from hippodrome.core.reading.config import ReaderConfig
 from hippodrome.core.reading.ground import Ground, ground_of
-from hippodrome.core.reading.lane import GRADE, Lines, Place, place_in_lane
-from hippodrome.core.reading.ridges import find_ridges
+from hippodrome.core.reading.lane import Lines, Place, beside_the_axle, place_in_lane
+from hippodrome.core.reading.memory import Memory
+from hippodrome.core.reading.ridges import find_ridges, trust_of
 from hippodrome.core.reading.traits import line_traits
 from hippodrome.core.reading.types import RoadReading
 from hippodrome.core.types import Float32Array, Frame
@@ -23,25 +24,35 @@ LEAST_ROWS: Final = 12  # frames that show the road in fewer rows are of no use
 
 
 class RoadReader:
-    """Reads the lane in frames of one camera. Between frames it keeps nothing but the width of the lanes that it has seen."""
+    """Reads the lane in frames of one camera. Between frames it keeps the width of the lanes that it has seen, and the borders that it has passed."""
 
     def __init__(self, camera: RoadCamera, config: ReaderConfig | None = None) -> None:
         self._camera, self._config = camera, config or ReaderConfig()
         self._ground: Ground | None = None
         self._size_px = (0, 0)
+        self._memory = Memory()
         self._width_m, self._width_sigma_m = self._config.lane_width_m, self._config.lane_width_sigma_m
 
-    def read(self, frame: Frame) -> RoadReading:
-        """What the frame (H, W, 3) RGB or (H, W) grey says; variances are ``inf`` for all that is not seen."""
+    def read(self, frame: Frame, moved_m: float = math.nan, turned_rad: float = math.nan) -> RoadReading:
+        """What the frame (H, W, 3) RGB or (H, W) grey says; variances are ``inf`` for all that is not seen.
+
+        With how far the vehicle went since the frame before (m, a tenth more or less does no harm) and turned (rad, to the
+        left), what was seen ahead then tells of the place where the rear axle is now. Without, each frame stands alone.
+        """
         ground = self._ground_of(frame)
+        self._memory.move(moved_m, turned_rad)
         if len(ground.rows) < LEAST_ROWS:
             return RoadReading()
-        grey = self._road(frame, ground)
-        lines = self._lines(grey, ground)
-        place = None if lines is None else place_in_lane(lines, self._width_m, self._width_sigma_m, self._config)
+        self._memory.out_of_sight(ground, self._camera.forward_m)
+        lines = self._lines(self._road(frame, ground), ground)
+        place = None
+        if lines is not None:
+            place = place_in_lane(lines, self._width_m, self._width_sigma_m, self._memory.edges, self._config)
         if lines is None or place is None or place.variance_m2 > self._config.largest_sigma_m**2:
             return RoadReading()
-        self._remember(place)
+        self._remember(lines, place)
+        if not beside_the_axle(lines, place, self._memory.told_m):
+            return RoadReading()
         return RoadReading(
             offset_m=-place.middle_m,
             offset_variance_m2=place.variance_m2,
@@ -69,21 +80,25 @@ class RoadReader:
     def _lines(self, grey: Float32Array, ground: Ground) -> Lines | None:
         """The lines along the road."""
         ridges = find_ridges(grey, ground.x_m, ground.y_m, self._config.line_m)
+        trust = trust_of(ridges) if len(ridges) > 0 else np.zeros(0)
+        ridges, weight = np.concatenate([ridges, self._memory.ridges]), np.concatenate([trust, self._memory.trust])
         if len(ridges) < LEAST_RIDGES:
             return None
-        weight = np.ones(len(ridges))
         arc = best_arc(ridges, weight)
         places = line_places(ridges, weight, arc)
         if len(places) == 0:
             return None
-        arc, covariance, places, about, owner = fit_arc(ridges, arc, places)
+        arc, covariance, places, about, owner = fit_arc(ridges, weight, arc, places)
         keep = about[:, 0] > 0.0
         if not np.all(keep):
             return None
         traits = line_traits(grey, ground.x_m, ground.y_m, ridges, owner, arc, places)
-        return Lines(arc, covariance, places, about, traits)
+        return Lines(arc, covariance, places, about, traits, ridges, weight, owner)
 
-    def _remember(self, place: Place) -> None:
+    def _remember(self, lines: Lines, place: Place) -> None:
+        of_border = (lines.owner >= 0) & np.isin(lines.owner, [place.left, place.right])
+        self._memory.keep(lines.ridges[of_border], lines.trust[of_border])
+        self._memory.edges = place.edges
         if math.isfinite(place.width_m):
             self._width_m += 0.05 * (place.width_m - self._width_m)
             self._width_sigma_m = max(0.08, 0.98 * self._width_sigma_m)

@@ -10,7 +10,8 @@ import numpy as np
 from hippodrome.core.types import Float32Array, FloatArray
 
 CONTRAST: Final = 0.15  # of a line against the brighter of its two sides, as a share of it: kerbs have less against the pavement
-LEAST_LEVELS: Final = 6.0  # the same in 8-bit levels: what is less drowns in noise
+LEAST_LEVELS: Final = 6.0  # the same in 8-bit levels ..
+LEAST_NOISES: Final = 5.0  # .. and in standard deviations of the noise: what is less may be chance
 FLANK_M: Final = 0.22  # how far aside of a line's middle its dark sides are looked for ..
 FLANK_PX: Final = 3  # .. and how many pixels more, which is how far a moving camera smears
 BROAD: Final = 1.8  # a ridge this many times as broad as a line, and ..
@@ -20,9 +21,23 @@ PER_ROW: Final = 24  # most ridges kept of a row
 
 
 @numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+def noise_levels(grey: Float32Array) -> float:
+    """Standard deviation of the noise (8-bit levels) from second differences along the rows, of which most see plain road."""
+    step, count = 5, 0
+    height, width = grey.shape
+    bent = np.empty(height * width // step + 1)
+    for row in range(height):
+        for u in range(1 + row % step, width - 1, step):
+            bent[count] = abs(grey[row, u - 1] - 2.0 * grey[row, u] + grey[row, u + 1])
+            count += 1
+    return float(np.median(bent[:count])) / (0.6745 * np.sqrt(6.0))
+
+
+@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
 def find_ridges(grey: Float32Array, x_m: Float32Array, y_m: Float32Array, line_m: float) -> FloatArray:
     """Ridges (N, 5): x, y in metres, metres per pixel, contrast in levels, number of the row; of the rows ``grey`` (R, W)."""
     count, width = grey.shape
+    noise = noise_levels(grey)
     found = np.empty((count * PER_ROW, 5))
     total = 0
     smooth = np.empty(width, np.float32)
@@ -51,7 +66,7 @@ def find_ridges(grey: Float32Array, x_m: Float32Array, y_m: Float32Array, line_m
                 right = min(right, smooth[k])
             base = max(left, right)
             contrast = top - base
-            if contrast < LEAST_LEVELS or contrast < CONTRAST * base:
+            if contrast < max(LEAST_LEVELS, LEAST_NOISES * noise / np.sqrt(2.0 * half + 1.0)) or contrast < CONTRAST * base:
                 continue
             level = base + 0.5 * contrast
             a = u
@@ -77,3 +92,10 @@ def find_ridges(grey: Float32Array, x_m: Float32Array, y_m: Float32Array, line_m
             total += 1
             kept += 1
     return found[:total]
+
+
+def trust_of(ridges: FloatArray) -> FloatArray:
+    """Weights (N,) up to 1: paint stands out, and what stands out much less than most of the paint in a frame may be none."""
+    contrast = ridges[:, 3]
+    strong = np.partition(contrast, int(0.8 * (len(contrast) - 1)))[int(0.8 * (len(contrast) - 1))]
+    return np.minimum(contrast / (0.6 * strong), 1.0) ** 2

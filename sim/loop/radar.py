@@ -11,23 +11,13 @@ from hippodrome.core.navigation.types import Lamp, Radar
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M
 from hippodrome.sim.loop.car import CENTRE_AHEAD_M, WIDTH_M
+from hippodrome.sim.loop.contact import corners_m
 from hippodrome.sim.loop.users import Users
 
 REACH_M: Final = 100.0  # of an ordinary 77 GHz radar, in town
 BESIDE_M: Final = 0.3  # so much room is kept on each side of the ego's own swept path
 GAP_NOISE_M: Final = 0.1  # standard deviations of a measurement
 SPEED_NOISE_MPS: Final = 0.1
-LAMP_REACH_M: Final = 80.0  # so far ahead a camera tells the colour of a signal
-YELLOW, RED, GREEN = "yY", "rRuU", "gG"
-
-
-def body_corners_m(poses_m: FloatArray, sizes_m: FloatArray) -> FloatArray:
-    """Corners (k, 4, 2) of upright boxes: front left, front right, rear right, rear left."""
-    cos, sin = np.cos(poses_m[:, 2])[:, None], np.sin(poses_m[:, 2])[:, None]
-    x = 0.5 * sizes_m[:, :1] * np.array([1.0, 1.0, -1.0, -1.0])
-    y = 0.5 * sizes_m[:, 1:2] * np.array([1.0, -1.0, -1.0, 1.0])
-    corners: FloatArray = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1) + poses_m[:, None, :2]
-    return corners
 
 
 def nearest_ahead(pose_m: tuple[float, float, float], curvature_1pm: float, users: Users) -> tuple[float, float]:
@@ -38,7 +28,7 @@ def nearest_ahead(pose_m: tuple[float, float, float], curvature_1pm: float, user
     """
     if len(users.names) == 0:
         return math.inf, 0.0
-    points = _outline_m(body_corners_m(users.poses_m, users.sizes_m))
+    points = _outline_m(corners_m(users.poses_m, users.sizes_m))
     dx, dy = points[..., 0] - pose_m[0], points[..., 1] - pose_m[1]
     cos, sin = math.cos(pose_m[2]), math.sin(pose_m[2])
     forward, left = cos * dx + sin * dy, cos * dy - sin * dx
@@ -65,14 +55,6 @@ def _outline_m(corners_m: FloatArray) -> FloatArray:
     share = np.linspace(0.0, 1.0, 5, endpoint=False)[:, None]
     points = corners_m[:, :, None] + share * (following - corners_m)[:, :, None]
     return points.reshape(len(corners_m), -1, 2)
-
-
-def lamp_of(state: str) -> Lamp:
-    """SUMO's letter for a link as a lamp; a signal that is off or blinks is none."""
-    for letters, lamp in ((GREEN, Lamp.GREEN), (YELLOW, Lamp.YELLOW), (RED, Lamp.RED)):
-        if state in letters:
-            return lamp
-    return Lamp.NONE
 
 
 def measured(gap_m: float, speed_mps: float, own_mps: float, way_is_free: bool, lamp: Lamp, rng: np.random.Generator) -> Radar:

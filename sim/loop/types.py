@@ -39,8 +39,9 @@ class Truth:
         lane_position_m: arc length of the rear axle's projection on that lane; nan off the road.
         offset_m: of the rear axle from the lane's middle, left positive; nan off the road.
         lane_heading_error_rad: heading of the vehicle against the lane's; nan off the road.
-        wheel_outside_m: how far the worst wheel is outside of the lane or, in a junction, of the paving; 0 inside.
-        on_paving: whether every wheel stands on a lane, a junction or a turning place.
+        wheel_outside_m: how far the worst wheel is outside of the lane and those beside it in the same direction or, in a
+            junction, off the paving; 0 inside.
+        off_paving_m: how far the worst wheel is off everything paved for cars: lanes, junctions, turning places; 0 on it.
         in_junction: whether the rear axle is on a lane inside a junction.
         driven_m: way of the rear axle since the reset.
     """
@@ -60,7 +61,7 @@ class Truth:
     offset_m: float
     lane_heading_error_rad: float
     wheel_outside_m: float
-    on_paving: bool
+    off_paving_m: float
     in_junction: bool
     driven_m: float
 
@@ -68,6 +69,11 @@ class Truth:
     def pose_m(self) -> tuple[float, float, float]:
         """The rear axle's pose in the network frame."""
         return self.x_m, self.y_m, self.heading_rad
+
+    @property
+    def on_paving(self) -> bool:
+        """Whether every wheel stands on a lane, a junction or a turning place."""
+        return self.off_paving_m <= 0.0
 
     def ground_truth(self) -> GroundTruth:
         """The same as recordings have it."""

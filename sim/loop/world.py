@@ -6,32 +6,35 @@ import math
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, Self
+from typing import Final, Self
 
 import libsumo
 import numpy as np
 
-from hippodrome.core.navigation.types import Indicator, Lamp
+from hippodrome.core.navigation.types import Indicator
 from hippodrome.core.types import FloatArray, Frame, HippodromeError, Observation
 from hippodrome.sim.ego import LENGTH_M, REAR_AXLE_TO_FRONT_M, WHEELBASE_M
-from hippodrome.sim.loop.car import Car, ahead_of, wheels_m
+from hippodrome.sim.loop.ahead import Lookout
+from hippodrome.sim.loop.car import Car, ahead_of
+from hippodrome.sim.loop.events import Watch
+from hippodrome.sim.loop.footing import height_and_pitch, stand
 from hippodrome.sim.loop.ground import Ground
+from hippodrome.sim.loop.moment import Moment
 from hippodrome.sim.loop.odometry import Odometry
 from hippodrome.sim.loop.puppet import Puppet
 from hippodrome.sim.loop.radar import measured, nearest_ahead
-from hippodrome.sim.loop.types import Event, LanePlace, Sensed, Truth
+from hippodrome.sim.loop.rights import Rights
+from hippodrome.sim.loop.sight import Sight
+from hippodrome.sim.loop.types import EventKind, LanePlace, Sensed, Truth
 from hippodrome.sim.loop.users import Onlooker
+from hippodrome.sim.loop.walls import Walls
 from hippodrome.sim.loop.ways import Ways
 from hippodrome.sim.scenario import Scenario
-from hippodrome.sim.scene.build import build_scene
-from hippodrome.sim.scene.conditions import apply_camera
+from hippodrome.sim.scene.build import scene_origin_m
 from hippodrome.sim.sumo_run import SUMO_STEP_S, BackgroundTraffic, sumo_run
 from hippodrome.sim.tour import tour_graph, toured_area
 from hippodrome.sim.town import build_town
 from hippodrome.sim.traffic import vehicle_types_xml
-
-if TYPE_CHECKING:
-    from hippodrome.sim.render.renderer import FrameRenderer
 
 STEP_S: Final = SUMO_STEP_S
 WARM_UP_S: Final = 20.0  # traffic spreads before the ego is there
@@ -60,7 +63,12 @@ class World:
         self.ground, self.ways = Ground(self.town), Ways(self.network)
         self._graph = tour_graph(self.network)
         self._drive = scenario.localization
-        self._renderer: FrameRenderer | None = None
+        self._rights = Rights(self.town.net_file, self.network)
+        self._lookout = Lookout(self.ground, self.ways, self._rights)
+        mapped_m = (1.0 - scenario.mapping.tour.revisit_share) * scenario.mapping.tour.planned_length_m()
+        self._area = toured_area(self._graph, max(mapped_m, ROAM_PER_VEHICLE_M * self._drive.traffic.vehicles))
+        self._walls = Walls(self.town, scenario.seed, scene_origin_m(self.town))
+        self._sight = Sight(scenario, self.town, self._points_of_area(), STEP_S)
         self._draw = draw
         self._sumo: ExitStack | None = None
 
@@ -80,9 +88,7 @@ class World:
         if self._sumo is not None:
             self._sumo.close()
             self._sumo = None
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        self._sight.close()
 
     def reset(self, seed: int, start: LanePlace | None = None) -> Sensed:
         """Begins anew: fresh traffic, the ego standing at ``start``, or at a place drawn by the seed.
@@ -97,11 +103,9 @@ class World:
         self._sumo = ExitStack()
         types = vehicle_types_xml(ego.accel_mps2, ego.decel_mps2, LENGTH_M)
         self._sumo.enter_context(sumo_run(self.town.net_file, types, seed))
-        mapped_m = (1.0 - self.scenario.mapping.tour.revisit_share) * self.scenario.mapping.tour.planned_length_m()
-        roamed_m = max(mapped_m, ROAM_PER_VEHICLE_M * self._drive.traffic.vehicles)
         climbs = self.town.heights_m is not None
-        area = toured_area(self._graph, roamed_m)
-        self._others = BackgroundTraffic(self._drive.traffic, self.network, self._graph, area, rng_traffic, climbs)
+        self._others = BackgroundTraffic(self._drive.traffic, self.network, self._graph, self._area, rng_traffic, climbs)
+        self._watch = Watch(self._rights)
         self._onlooker, self._puppet = Onlooker(climbs), Puppet(self.network, self.ways)
         self._odometry = Odometry(self.scenario.self_motion_noise, self._rng_odometry)
         for step in range(round(WARM_UP_S / STEP_S)):
@@ -109,9 +113,10 @@ class World:
                 self._others.refill(ego_on_road=False)
             libsumo.simulationStep()
         self._car = Car(*self.ground.pose_at(lane, position_m))
-        self._steps, self._driven_m, self._frames = 0, 0.0, 0
+        self._steps, self._driven_m = 0, 0.0
         self._lane, self._front_lane, self._before = lane, lane, lane
         self._indicator, self._accel_mps2 = Indicator.STRAIGHT, 0.0
+        self._signals: dict[int, str] = {}
         self.cleared = self._clear_room()
         self._move()
         return self._sensed(0.0, 0.0)
@@ -154,12 +159,18 @@ class World:
             return network.lane_ids.index(start.lane_id), start.position_m
         room = REAR_AXLE_TO_FRONT_M + 2.0 * ENDS_M
         lengths = network.lane_lengths_m()
-        inside = np.isin(network.lane_edge, self._graph.edges) & ~network.is_internal
+        inside = np.isin(network.lane_edge, self._graph.edges[self._area]) & ~network.is_internal
         long = np.flatnonzero(inside & (lengths > room))
         lanes = long if len(long) else np.flatnonzero(inside)
         spare = np.maximum(lengths[lanes] - room, 0.1)
         lane = int(rng.choice(lanes, p=spare / spare.sum()))
         return lane, min(ENDS_M, 0.5 * float(lengths[lane])) + float(rng.uniform(0.0, max(lengths[lane] - room, 0.0)))
+
+    def _points_of_area(self) -> FloatArray:
+        """Points (n, 2) of the lanes that traffic and the ego drive on: what can be seen from them is drawn."""
+        network = self.network
+        inside = np.isin(network.lane_edge, self._graph.edges[self._area])
+        return network.points_m[np.repeat(inside, np.diff(network.point_start))]
 
     def _clear_room(self) -> int:
         """Takes the vehicles off the road that are where the ego begins; how many."""
@@ -171,51 +182,56 @@ class World:
         return int(near.sum())
 
     def _move(self) -> None:
-        """Finds the ego's lanes, tells SUMO, and lets SUMO step."""
-        pose = self._car.pose_m
-        points = np.array([pose[:2], ahead_of(pose, REAR_AXLE_TO_FRONT_M), *wheels_m(pose)])
-        self._near = self.ground.near(points)
-        self._column = self.ground.lane_of(self._near, 0, pose[2], self._lane)
-        front = self.ground.lane_of(self._near, 1, pose[2], self._front_lane)
-        self._lane = int(self._near.lane[self._column]) if self._column >= 0 else -1
-        self._front_lane = int(self._near.lane[front]) if front >= 0 else -1
+        """Finds the ego's lanes, tells SUMO, lets SUMO step, and looks round."""
+        pose, signals = self._car.pose_m, self._signals
+        self._footing = stand(self.ground, pose, self._lane, self._front_lane)
+        self._lane, self._front_lane = self._footing.lane, self._footing.front_lane
+        last = self._before
         if self._front_lane >= 0 and not self.network.is_internal[self._front_lane]:
             self._before = self._front_lane
+        speed, put_back = self._car.speed_mps, self.put_back
         try:
-            self._way = self._puppet.place(pose, self._car.speed_mps, self._front_lane, self._before, self._indicator)
+            self._puppet.place(pose, speed, self._front_lane, self._before, self._indicator)
             libsumo.simulationStep()
             self._users = self._onlooker.near(*pose[:2])
+            self._ahead = self._lookout.look(self._footing, self._before, self._indicator, speed, self._users, pose[:2])
+            user_lanes = self._lookout.lanes_of(self._users)
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise HippodromeError(f"{self.town.net_file}: SUMO failed: {' '.join(str(error).split())}") from error
+        self._truth = self._look_down()
+        now = self._signals = self._ahead.signals
+        moment = Moment(
+            truth=self._truth,
+            users=self._users,
+            user_lanes=user_lanes,
+            front_lane=self._front_lane,
+            against=self._footing.against,
+            off_road=self._footing.off_road,
+            signals={lane: (signals[lane], now[lane]) for lane in now if lane in signals} if last == self._before else {},
+            coming=self._ahead.coming,
+            building=self._footing.off_paving_m > 0.0 and self._walls.touch(pose),
+            put_back=self.put_back > put_back,
+        )
+        self._events = self._watch.look(moment)
+        if any(event.kind in (EventKind.COLLISION, EventKind.BUILDING) for event in self._events):
+            self._car.halt()
 
     def _sensed(self, travelled_m: float, turned_rad: float) -> Sensed:
-        t_s = self._steps * STEP_S
+        truth, pose = self._truth, self._truth.pose_m
         speed, yaw_rate = self._odometry.sense(travelled_m, turned_rad, STEP_S)
-        truth = self._truth(t_s)
-        gap, other = nearest_ahead(truth.pose_m, self._car.curvature_1pm, self._users)
-        radar = measured(gap, other, self._car.speed_mps, True, Lamp.NONE, self._rng_radar)
-        observation = Observation(t_s, STEP_S, speed, yaw_rate, self._frame(truth.pose_m))
-        events: tuple[Event, ...] = ()
-        return Sensed(observation, radar, truth, events, self._users.poses_m)
+        gap, other = nearest_ahead(pose, self._car.curvature_1pm, self._users)
+        radar = measured(gap, other, self._car.speed_mps, self._ahead.way_is_free, self._ahead.lamp, self._rng_radar)
+        frame: Frame | None = None
+        if self._draw and self._sight.is_due(self._steps):
+            seen_from = np.array([*pose, *height_and_pitch(self.ground, pose, self._footing)])
+            frame = self._sight.frame(seen_from, self._users, np.random.default_rng([self._seed, self._steps]))
+        observation = Observation(truth.t_s, STEP_S, speed, yaw_rate, frame)
+        return Sensed(observation, radar, truth, self._events, self._users.poses_m)
 
-    def _truth(self, t_s: float) -> Truth:
-        pose, car, near, k = self._car.pose_m, self._car, self._near, self._column
-        here = k >= 0
-        beyond = np.maximum(near.distance_m[2:] - 0.5 * self.network.width_m[near.lane], 0.0)
-        off = beyond.min(axis=1, initial=9.9)
-        if (off > 0.0).any():
-            off = np.where(self.ground.in_areas(wheels_m(pose)), 0.0, off)
-        inside = here and bool(self.network.is_internal[self._lane])
-        worst = float(off.max())
-        if here and not inside:
-            own = np.isin(near.lane, self.ground.kin(self._lane)) | self.network.is_internal[near.lane]
-            aside = np.where(own, beyond, np.inf).min(axis=1)
-            if (aside > 0.0).any():
-                aside = np.where(self.ground.in_areas(wheels_m(pose)), 0.0, aside)
-            worst = float(aside.max())
-        heading = float(near.heading_rad[0, k]) if here else math.nan
+    def _look_down(self) -> Truth:
+        pose, car, footing = self._car.pose_m, self._car, self._footing
         return Truth(
-            t_s=t_s,
+            t_s=self._steps * STEP_S,
             x_m=pose[0],
             y_m=pose[1],
             heading_rad=pose[2],
@@ -224,46 +240,13 @@ class World:
             acceleration_mps2=self._accel_mps2,
             steering_rad=car.steering_rad,
             indicator=self._indicator,
-            lane=self._lane,
-            lane_id=self.network.lane_ids[self._lane] if here else "",
-            lane_position_m=float(near.position_m[0, k]) if here else math.nan,
-            offset_m=float(near.offset_m[0, k]) if here else math.nan,
-            lane_heading_error_rad=(pose[2] - heading + math.pi) % (2.0 * math.pi) - math.pi,
-            wheel_outside_m=worst,
-            on_paving=bool((off <= 0.0).all()),
-            in_junction=inside,
+            lane=footing.lane,
+            lane_id=self.network.lane_ids[footing.lane] if footing.lane >= 0 else "",
+            lane_position_m=footing.position_m,
+            offset_m=footing.offset_m,
+            lane_heading_error_rad=footing.heading_error_rad,
+            wheel_outside_m=footing.wheel_outside_m,
+            off_paving_m=footing.off_paving_m,
+            in_junction=footing.in_junction,
             driven_m=self._driven_m,
         )
-
-    def _frame(self, pose_m: tuple[float, float, float]) -> Frame | None:
-        """The camera's image, if it takes one at this step."""
-        if not self._draw:
-            return None
-        rate = min(self.scenario.camera.rate_hz * STEP_S, 1.0)
-        due = math.floor(self._steps * rate + 1e-9) > math.floor((self._steps - 1) * rate + 1e-9) or self._steps == 0
-        if not due:
-            return None
-        if self._renderer is None:
-            self._renderer = self._new_renderer()
-        pose = np.array([*pose_m, *self._height_and_pitch()])
-        users = self._users
-        image = self._renderer.render(pose, users.poses_m, users.kinds, users.ids)
-        self._frames += 1
-        return apply_camera(image, self._drive.conditions, np.random.default_rng([self._seed, self._frames - 1]))
-
-    def _height_and_pitch(self) -> tuple[float, ...]:
-        """Height of the road below the rear axle and the pitch of the ego; nothing in a flat town."""
-        if self.town.heights_m is None:
-            return ()
-        rear = self.ground.height_m(self._lane, float(self._near.position_m[0, self._column]) if self._column >= 0 else 0.0)
-        ahead = self.ground.near(np.array([ahead_of(self._car.pose_m, WHEELBASE_M)]))
-        k = self.ground.lane_of(ahead, 0, self._car.pose_m[2], self._lane)
-        front = self.ground.height_m(int(ahead.lane[k]), float(ahead.position_m[0, k])) if k >= 0 else rear
-        return rear, math.atan((front - rear) / WHEELBASE_M)
-
-    def _new_renderer(self) -> FrameRenderer:
-        from hippodrome.sim.render.renderer import FrameRenderer  # not before a frame is drawn: without frames no GL is needed
-
-        seen: FloatArray = self.network.points_m
-        scene = build_scene(self.town, self.scenario.seed, self._drive.conditions, seen)
-        return FrameRenderer(scene, self.scenario.camera)

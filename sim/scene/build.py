@@ -33,7 +33,7 @@ def build_scene(
         half_view_rad: Half the angle that is seen around each pose's heading, for poses (n, 3) that are few; None: the drive
             looks everywhere.
     """
-    origin_m = np.round(0.5 * (town.network.points_m.min(axis=0) + town.network.points_m.max(axis=0)))
+    origin_m = scene_origin_m(town)
     light = light_of(conditions)
     if drive_m is None or is_drawn_whole(town):
         tiles = _tiles(*town_mesh(town, seed, origin_m), conditions)
@@ -47,6 +47,12 @@ def build_scene(
         extinction_per_m=extinction_per_m(conditions),
         light=light,
     )
+
+
+def scene_origin_m(town: Town) -> FloatArray:
+    """Network coordinates (2,) of the scene's zero."""
+    middle: FloatArray = np.round(0.5 * (town.network.points_m.min(axis=0) + town.network.points_m.max(axis=0)))
+    return middle
 
 
 def _seen_tiles(

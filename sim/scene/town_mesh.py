@@ -10,9 +10,9 @@ import numpy as np
 
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.scene.blocks import BESIDE_M, GROUND_M, HORIZON_M, Block, town_near
-from hippodrome.sim.scene.buildings import building_mesh, place_buildings
+from hippodrome.sim.scene.buildings import Buildings, building_mesh, place_buildings
 from hippodrome.sim.scene.furniture import furniture_mesh
-from hippodrome.sim.scene.land import field_mesh, ground_mesh, patch_mesh, place_fields
+from hippodrome.sim.scene.land import Fields, field_mesh, ground_mesh, patch_mesh, place_fields
 from hippodrome.sim.scene.lanes import cut_lanes
 from hippodrome.sim.scene.mesh import Mesh, merge
 from hippodrome.sim.scene.placement import Bools, Border, Shapes, borders, other_lanes, paved_area, quilt
@@ -59,15 +59,7 @@ def block_mesh(land: Land, seed: int, origin_m: FloatArray, block: Block) -> tup
     Districts, the roads' tones and the ground's are the whole town's; all else comes from the block's own stream.
     """
     whole, own = np.random.default_rng(seed).spawn(8), block.stream(seed).spawn(8)
-    border_m, points_m = land.border.point_m, land.road_points_m
-    near = Land(
-        town=town_near(land.town, origin_m, [block], BESIDE_M),
-        border=land.border.select(block.holds(border_m, BESIDE_M)),
-        horizon=land.border.select(block.holds(border_m, HORIZON_M)),
-        road_points_m=points_m[block.holds(points_m, GROUND_M)],
-        relief=land.relief,
-        block=block,
-    )
+    near = _land_near(land, origin_m, block)
     if len(near.road_points_m) == 0:
         return merge([]), merge([])
     if near.town.network.lane_count == 0:
@@ -78,15 +70,54 @@ def block_mesh(land: Land, seed: int, origin_m: FloatArray, block: Block) -> tup
     return _mesh(near, [*whole[:2], *own[2:7], whole[7]], origin_m)
 
 
+def _land_near(land: Land, origin_m: FloatArray, block: Block) -> Land:
+    """The part of the land that a block and what is seen in it need."""
+    border_m, points_m = land.border.point_m, land.road_points_m
+    return Land(
+        town=town_near(land.town, origin_m, [block], BESIDE_M),
+        border=land.border.select(block.holds(border_m, BESIDE_M)),
+        horizon=land.border.select(block.holds(border_m, HORIZON_M)),
+        road_points_m=points_m[block.holds(points_m, GROUND_M)],
+        relief=land.relief,
+        block=block,
+    )
+
+
+def building_footprints(land: Land, seed: int, origin_m: FloatArray, block: Block | None = None) -> Shapes:
+    """Outlines of the buildings of ``town_mesh`` or, with a block, of ``block_mesh``, relative to the origin."""
+    whole = np.random.default_rng(seed).spawn(8)
+    streams = whole if block is None else block.stream(seed).spawn(8)
+    near = land if block is None else _land_near(land, origin_m, block)
+    if near.town.network.lane_count == 0 or len(near.road_points_m) == 0:
+        return np.zeros(0, dtype=object)
+    roads = np.concatenate(_obstacles(near, origin_m))
+    return _fields_and_buildings(near, _town_share(near.town, whole[0]), roads, streams[5], streams[2])[1].footprints()
+
+
+def _obstacles(land: Land, origin_m: FloatArray) -> tuple[Shapes, Shapes]:
+    """All that is paved, and all that lies outside of the land's block."""
+    paved = np.concatenate([paved_area(land.town, origin_m)[0], other_lanes(land.town, origin_m)])
+    return paved, np.zeros(0, dtype=object) if land.block is None else land.block.outside()
+
+
+def _fields_and_buildings(
+    land: Land,
+    share: Callable[[FloatArray], FloatArray],
+    roads: Shapes,
+    field: np.random.Generator,
+    build: np.random.Generator,
+) -> tuple[Fields, Buildings]:
+    """What is placed first; all else stands clear of it."""
+    fields = place_fields(land.border, share(land.border.point_m), roads, field)
+    return fields, place_buildings(land.border, share(land.border.point_m), roads, fields.footprints(), build)
+
+
 def _mesh(land: Land, streams: Sequence[np.random.Generator], origin_m: FloatArray) -> tuple[Mesh, Mesh]:
     """What stands on the land, and the surfaces whose middles lie on it."""
     district, road, build, plant, hedge, field, post, ground = streams
     town, border, share = land.town, land.border, _town_share(land.town, district)
-    paved = np.concatenate([paved_area(town, origin_m)[0], other_lanes(town, origin_m)])
-    outside: Shapes = np.zeros(0, dtype=object) if land.block is None else land.block.outside()
-    roads = np.concatenate([paved, outside])
-    fields = place_fields(border, share(border.point_m), roads, field)
-    buildings = place_buildings(border, share(border.point_m), roads, fields.footprints(), build)
+    paved, outside = _obstacles(land, origin_m)
+    fields, buildings = _fields_and_buildings(land, share, np.concatenate([paved, outside]), field, build)
     built = np.concatenate([buildings.footprints(), fields.footprints(), outside])
     trees = place_trees(border, paved, built, plant)
     hedges, hedge_ground = hedge_mesh(border, paved, built, hedge)

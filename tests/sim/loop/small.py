@@ -2,8 +2,11 @@
 
 import math
 
+import libsumo
+
 from hippodrome.core.navigation.types import Indicator
 from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.sumo_tools import run_tool
 
 GRID = {"kind": "grid", "width_m": 150, "height_m": 150, "road_km": 1.0}
 
@@ -44,3 +47,34 @@ def next_lane(world, lane, indicator):
         return int(world.network.successors(lane)[0])
     way = world.ways.meant(lane, indicator)
     return (*way.inside, way.target)[0]
+
+
+ARMS = {"w": (-120, 0), "e": (120, 0), "n": (0, 120), "s": (0, -120)}
+
+
+def crossing(folder, kind="priority", lanes=1, left_hand=False):
+    """A crossing of four streets with dead ends; the one from w to e has priority. Edges are called w-c, c-e and so on."""
+    nodes, edges, net = (folder / f"crossing.{part}.xml" for part in ("nod", "edg", "net"))
+    rows = [f'<node id="{n}" x="{x}" y="{y}"/>' for n, (x, y) in ARMS.items()]
+    nodes.write_text(f'<nodes><node id="c" x="0" y="0" type="{kind}" radius="6"/>' + "".join(rows) + "</nodes>")
+    common = f'numLanes="{lanes}" speed="8.33" width="3.2"'
+    rows = [
+        f'<edge id="{a}-{b}" from="{a}" to="{b}" priority="{9 if arm in "we" else 1}" {common}/>'
+        for arm in ARMS
+        for a, b in ((arm, "c"), ("c", arm))
+    ]
+    edges.write_text("<edges>" + "".join(rows) + "</edges>")
+    files = f"--node-files={nodes}", f"--edge-files={edges}", f"--output-file={net}"
+    side = ("--lefthand=true",) if left_hand else ()
+    run_tool("netconvert", *files, "--offset.disable-normalization=true", "--no-turnarounds.except-deadend=true", *side)
+    return {"network": str(net)}
+
+
+def car(name, edges, position_m, speed_mps=0.0, standing=False, lane=0):
+    """Puts another vehicle on the road, in front of SUMO's position ``position_m``; ``standing``: it never moves."""
+    libsumo.route.add(f"route-{name}", edges)
+    libsumo.vehicle.add(
+        name, f"route-{name}", typeID="kind0", departLane=str(lane), departPos=str(position_m), departSpeed=str(speed_mps)
+    )
+    if standing:
+        libsumo.vehicle.setSpeed(name, 0.0)

@@ -41,7 +41,7 @@ CORE_ROOMS = {
 EVAL_ROOMS = (
     "metrics", "files", "methods", "results", "pool", "reuse", "figures", "report", "rivals/ratslam", "rivals/orbslam3",
     "rivals", "contest", "evaluate", "run", "authoring", "gate", "board", "sweep", "trials/stress", "trials/robustness",
-    "trials/rivals", "exchange/drives", "exchange/readers", "exchange/formats", "exchange", "real", "commands", "cli",
+    "trials/rivals", "drive", "exchange/drives", "exchange/readers", "exchange/formats", "exchange", "real", "commands", "cli",
 )  # fmt: skip
 CORE_PACKAGES = {"cv2", "numba", "numpy", "scipy"}
 STANDARD_IN_CORE = {"__future__", "collections", "dataclasses", "enum", "functools", "heapq", "itertools", "math", "typing"}

@@ -25,7 +25,7 @@ from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.driving import pace
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
 from hippodrome.core.navigation.placing import keeps_left, lane_of, lane_that_is_read
-from hippodrome.core.navigation.searching import search_step
+from hippodrome.core.navigation.searching import LaneMemory, remembered, search_step
 from hippodrome.core.navigation.sight import Ground
 from hippodrome.core.navigation.speed import approach_mps2, following_mps2
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
@@ -90,6 +90,8 @@ class Navigator:
         self._motion, self._health = motions.Motion(), SensorHealth()
         self._expected_scale = self._localizer.metres_per_unit
         self._reading: RoadReading | None = None
+        self._memory = LaneMemory()
+        self._since_frame = np.zeros(2)  # metres and rad
         self._track: Track | None = None
         self._plan: Plan | None = None
         self._has_goal = False
@@ -123,7 +125,7 @@ class Navigator:
             observation = replace(observation, frame=None)
         self.estimate = self._localizer.step(observation)
         distance_m = self._move(observation, radar)
-        self._read(observation)
+        self._read(observation, distance_m)
         self._follow_localizer(distance_m, dt_s)
         self._correct_by_lane(observation)
         command = self._decide(radar, dt_s)
@@ -150,14 +152,19 @@ class Navigator:
         self._since_fix_m += distance_m
         return distance_m
 
-    def _read(self, observation: Observation) -> None:
+    def _read(self, observation: Observation, distance_m: float) -> None:
         """Read the lane in a new frame; between frames there is no reading."""
         self._reading = None
+        self._since_frame = self._since_frame + np.array([distance_m, observation.yaw_rate_radps * observation.dt_s])
         if observation.frame is not None and self._config.read_road:
             if self._reader is None:
                 size_px = observation.frame.shape[1], observation.frame.shape[0]
                 self._reader = RoadReader(self._config.camera.on_road(*size_px))
-            self._reading = self._reader.read(observation.frame)
+            self._reading = self._reader.read(observation.frame, *self._since_frame.tolist())
+            self._since_frame = np.zeros(2)
+        turned_rad = observation.yaw_rate_radps * observation.dt_s
+        border_m = self._ground.border_m(self._side)
+        self._memory = remembered(self._memory, self._reading, distance_m, turned_rad, border_m, self._side)
 
     def _follow_localizer(self, distance_m: float, dt_s: float) -> None:
         """Begin, correct, or give up the pose that is steered by, as the localizer says."""
@@ -238,7 +245,7 @@ class Navigator:
     def _searching(self, radar: Radar) -> Command:
         """On sight along the border."""
         config, speed = self._config, self._motion.speed_mps
-        step = search_step(self._ground, self._reading, radar, self._side, speed, config.drive, config.vehicle)
+        step = search_step(self._ground, self._memory, self._reading, radar, self._side, speed, config.drive, config.vehicle)
         accel = min(
             approach_mps2(speed, step.speed_mps, config.drive), following_mps2(speed, radar, config.drive, config.vehicle)
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,9 +18,64 @@ from hippodrome.core.reading.types import LaneEnd, RoadReading
 BESIDE_M = 1.35  # from the edge line to the middle of a lane of 3.2 m whose line is painted inside of the border
 LOOK_M = 14.0  # of the way ahead
 CORNER_RAD = 0.3  # a way that has turned so much goes round a corner
-STRAIGHT_1PM = 0.04  # a straighter way may be steered by the lane that is read
+BESIDE_RANGE_M = (0.9, 1.9)  # what that distance can be
+FRESH_M = 2.5  # a lane that was read is steered by for so long
+FORGOTTEN_M = 8.0  # after so long without a reading, any reading is believed
+JUMP_M = 0.6  # readings that differ by more are of different lanes
+STRAIGHT_M = 6.0  # without a corner so far ahead, the lane that is read is steered by, and not the border
 BLIND_M = 5.0  # the way is driven so far without a border beside it, at walking pace
-SURE_M2 = 0.04  # variance of an offset in the lane that is better than the border's
+SURE_M2 = 0.03  # variance of an offset in the lane that is steered by
+
+
+@dataclass(frozen=True, slots=True)
+class LaneMemory:
+    """The lane as it was read last, moved on by dead reckoning; and how far its middle is from the border on the own side.
+
+    Args:
+        offset_m, heading_rad, curvature_1pm: as in ``RoadReading``.
+        since_m: driven since the lane was read.
+        beside_m: from the border of the ground's map to the lane's middle, learnt where both are seen.
+    """
+
+    offset_m: float = 0.0
+    heading_rad: float = 0.0
+    curvature_1pm: float = 0.0
+    since_m: float = math.inf
+    beside_m: float = BESIDE_M
+
+    @property
+    def is_fresh(self) -> bool:
+        """Whether the lane is known well enough to steer by."""
+        return self.since_m < FRESH_M
+
+
+def remembered(
+    memory: LaneMemory, reading: RoadReading | None, distance_m: float, turned_rad: float, border_m: float, side: float
+) -> LaneMemory:
+    """The memory after a step and, where there is one, a reading. A reading that jumps aside is of another lane and is left out.
+
+    ``border_m`` is the distance to the border on the own ``side`` in the ground's map, nan where none is known.
+    """
+    heading = memory.heading_rad + turned_rad - memory.curvature_1pm * distance_m
+    offset, since = memory.offset_m + distance_m * math.sin(heading), memory.since_m + distance_m
+    moved = replace(memory, offset_m=offset, heading_rad=heading, since_m=since)
+    if reading is None or reading.offset_variance_m2 > SURE_M2 or not math.isfinite(reading.heading_rad):
+        return moved
+    if since < FORGOTTEN_M and abs(reading.offset_m - offset) > JUMP_M:
+        return moved
+    new = 1.0 if since > FORGOTTEN_M else 0.5
+    bend = reading.curvature_1pm if math.isfinite(reading.curvature_1pm) else 0.0
+    seen = replace(
+        moved,
+        offset_m=offset + new * (reading.offset_m - offset),
+        heading_rad=heading + new * (reading.heading_rad - heading),
+        curvature_1pm=memory.curvature_1pm + 0.3 * (bend - memory.curvature_1pm),
+        since_m=0.0,
+    )
+    middle_m = border_m + side * seen.offset_m
+    if BESIDE_RANGE_M[0] < middle_m < BESIDE_RANGE_M[1] and abs(seen.heading_rad) < CORNER_RAD:
+        seen = replace(seen, beside_m=memory.beside_m + 0.1 * (middle_m - memory.beside_m))
+    return seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,21 +89,22 @@ class SearchStep:
 
 
 def search_step(
-    ground: Ground, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float,
+    ground: Ground, memory: LaneMemory, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float,
     config: DriveConfig, vehicle: VehicleShape,
 ) -> SearchStep:  # fmt: skip
     """The next step along the border on the own ``side``: -1 right, +1 left."""
-    way = ground.way(side, BESIDE_M, LOOK_M)
+    way = ground.way(side, memory.beside_m, LOOK_M)
     bends, turned = way.curvature_1pm, way.heading_rad - way.heading_rad[0]
     near = min(int((1.0 + 0.35 * speed_mps) / STEP_M), len(bends) - 1)
     curvature = float(bends[near])
-    straight = bool(np.max(np.abs(bends[: near + 8])) < STRAIGHT_1PM)
-    if reading is not None and straight and reading.offset_variance_m2 < SURE_M2 and math.isfinite(reading.heading_rad):
-        bend = reading.curvature_1pm if math.isfinite(reading.curvature_1pm) else 0.0
-        curvature = lane_curvature_1pm(bend, reading.offset_m, reading.heading_rad, speed_mps, config)
+    straight = bool(np.max(np.abs(turned[: int(STRAIGHT_M / STEP_M)])) < CORNER_RAD)
+    if memory.is_fresh and straight:
+        bend, offset_m, heading = memory.curvature_1pm, memory.offset_m, memory.heading_rad
+        curvature = lane_curvature_1pm(bend, offset_m, heading, speed_mps, config)
     wanted, reason = config.search_mps, "looks for known ground"
-    ahead = np.abs(bends[: int(8.0 / STEP_M)])
-    braking = 2.0 * config.braking_mps2 * STEP_M * np.arange(len(ahead))
+    first_m = STRAIGHT_M if memory.is_fresh and straight else 0.0  # up to there the lane is driven, and not the border
+    ahead = np.abs(bends[int(first_m / STEP_M) :])
+    braking = 2.0 * config.braking_mps2 * (first_m + STEP_M * np.arange(len(ahead)))
     wanted = min(wanted, float(np.min(np.sqrt(config.lateral_mps2 / np.maximum(ahead, 1e-3) + braking))))
     if not np.any(way.seen[: int(BLIND_M / STEP_M)]):
         wanted, reason = min(wanted, config.creep_mps), "sees no border of the road"

@@ -127,6 +127,12 @@ class Ground:
         free_m = STEP_M * float(blocked[0] if len(blocked) else len(rows))
         return Way(rows[:, 0], rows[:, 1], rows[:, 2], free_m)
 
+    def border_m(self, side: float) -> float:
+        """Distance from the vehicle's line of travel to the border on one side, a little ahead of the rear axle; nan if unknown."""
+        x, y = self.pose[0] + NEAR_M * math.cos(self.pose[2]), self.pose[1] + NEAR_M * math.sin(self.pose[2])
+        found = float(_border_m(self._cells, self._origin_m, x, y, self.pose[2], side))
+        return found if 0.0 <= found < REACH_M else math.nan
+
     def off_road_share(self, points_m: FloatArray) -> float:
         """Which share of points (n, 2) in the vehicle's axes is known to be no road, of those that are known."""
         cos, sin = math.cos(self.pose[2]), math.sin(self.pose[2])

@@ -86,7 +86,9 @@ def _mission(network: RoadNetwork, mapped: BoolArray, seed: int, number: int, cl
     inside &= ~np.isin(network.lane_edge, np.array(sorted(closed), dtype=np.int32))
     lanes = np.flatnonzero(inside & (lengths > 2.0 * ROOM_M))
     if len(lanes) < 2:
-        raise HippodromeError("missions: the network has no two lanes that are long enough to start and to stop on; choose a larger one")
+        raise HippodromeError(
+            "missions: the network has no two lanes that are long enough to start and to stop on; choose a larger one"
+        )
     spare = lengths[lanes] - 2.0 * ROOM_M
     best: Mission | None = None
     for _ in range(TRIES):

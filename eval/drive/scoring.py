@@ -21,6 +21,7 @@ from hippodrome.sim.loop.types import EventKind
 
 REACHED_M: Final = 3.0  # from the goal's place on its lane, the rear axle
 MOVING_MPS: Final = 0.1
+TYRE_M: Final = 0.05  # a tyre on the line is in the lane
 HARSH_MPS2: Final = 3.0  # braking and speeding up that passengers complain of
 PENALTIES: Final = {  # CARLA leaderboard 2.0
     EventKind.COLLISION: 0.60,  # with a vehicle
@@ -94,7 +95,7 @@ def mission_result(mission: Mission, flight: Flight, network: RoadNetwork, refer
         "completion": completion,
         "events": dict(sorted(Counter(f"{event.kind.value}{'' if event.at_fault else ' of others'}"
                                       for event in flight.events).items())),
-        "outside_lane_share": float(np.mean(flight.column("wheel_outside_m") > 0.0)),
+        "outside_lane_share": float(np.mean(flight.column("wheel_outside_m") > TYRE_M)),
         "lane_rms_m": float(np.sqrt(np.mean(aside**2))) if len(aside) else None,
         "lane_worst_m": float(aside.max()) if len(aside) else None,
         "metres_until_localized": float(flight.column("driven_m")[fixed[0]]) if len(fixed) else None,

@@ -137,3 +137,11 @@ def offset_and_turn(course: Course, pose_m: FloatArray, u_m: float) -> tuple[flo
 def next_gate(course: Course, u_m: float) -> Gate | None:
     """The junction that the place ``u_m`` is before or in."""
     return next((gate for gate in course.gates if gate.exit_u_m > u_m), None)
+
+
+def path_poses(course: Course, from_u_m: float, to_u_m: float) -> FloatArray:
+    """Poses (n, 3) of the path between two distances along it, two samples apart."""
+    last = len(course.path.points_m) - 1
+    rows = np.arange(min(int(from_u_m / STEP_M), last), min(int(to_u_m / STEP_M), last) + 1, 2)
+    poses: FloatArray = np.column_stack([course.path.points_m[rows], course.path.heading_rad[rows]])
+    return poses

@@ -7,14 +7,18 @@ the vehicle itself: in a steered turn the yaw rate is v tan(delta) / L (the sing
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hippodrome.core.navigation.config import VehicleShape
 from hippodrome.core.types import Observation
 
 PRIOR_SIGMA = 0.28  # of ln(scale): two drives differ by a fifth each
 VISUAL_SIGMA, VISUAL_M = 0.06, 12.0  # what visual odometry tells, once it has seen so many metres
-STEERED_SIGMA, STEERED_RAD = 0.03, 0.4  # what turns tell, once the vehicle has turned so much
+TOLD_SIGMA, TOLD_PER_M = (
+    0.03,
+    0.02,
+)  # what the localizer tells, and how fast it is followed: one wrong view moves its scale by a tenth
+STEERED_SIGMA, STEERED_RAD = 0.04, 0.4  # what turns tell, once the vehicle has turned so much
 LEAST_BEND_1PM = 0.03  # straighter driving tells nothing of the scale
 MEMORY = 0.997  # of the sums, per step of a tenth of a second: the scale wanders over some hundred metres
 WHEEL_RATE_RADPS = 0.9  # how fast the road wheels can be turned
@@ -32,6 +36,7 @@ class Motion:
     turned: float = 0.0  # sum of yaw rate times what a unit turns: numerator of the least-squares scale
     turning: float = 0.0  # sum of the squares of the latter
     turned_rad: float = 0.0  # how much was turned in all, up to a bound
+    told: float = math.nan  # ln(scale) as the localizer tells it, smoothed; nan until it does
 
     def metres_per_unit(self, expected: float) -> float:
         """The scale: a mean of ln(scale) by what is expected, frames and turns, each with its weight."""
@@ -42,6 +47,8 @@ class Motion:
         if self.turned > 0.0 and self.turning > 0.0:
             trust = min(self.turned_rad / STEERED_RAD, 1.0) ** 2 / STEERED_SIGMA**2
             total, weight = total + trust * math.log(self.turned / self.turning), weight + trust
+        if not math.isnan(self.told):
+            total, weight = total + self.told / TOLD_SIGMA**2, weight + 1.0 / TOLD_SIGMA**2
         return math.exp(total / weight)
 
 
@@ -61,12 +68,19 @@ def sensed(
         turned = MEMORY * turned + observation.yaw_rate_radps * dt_s * bend * units
         turning = MEMORY * turning + (bend * units) ** 2
         turned_rad = min(turned_rad + abs(observation.yaw_rate_radps) * dt_s, 1.0)
-    return Motion(max(smooth, 0.0), motion.steering_rad, seen_m, seen_units, turned, turning, turned_rad)
+    return Motion(max(smooth, 0.0), motion.steering_rad, seen_m, seen_units, turned, turning, turned_rad, motion.told)
 
 
 def commanded(motion: Motion, acceleration_mps2: float, steering_rad: float, dt_s: float) -> Motion:
     """The motion as a command makes it: the wheels turn as fast as they can, the speed changes as it was told to."""
     most = WHEEL_RATE_RADPS * dt_s
     wheels = motion.steering_rad + min(max(steering_rad - motion.steering_rad, -most), most)
-    speed = max(motion.speed_mps + acceleration_mps2 * dt_s, 0.0)
-    return Motion(speed, wheels, motion.seen_m, motion.seen_units, motion.turned, motion.turning, motion.turned_rad)
+    return replace(motion, speed_mps=max(motion.speed_mps + acceleration_mps2 * dt_s, 0.0), steering_rad=wheels)
+
+
+def told(motion: Motion, metres_per_unit: float, distance_m: float) -> Motion:
+    """The motion after the localizer told its scale, over a distance in which it was sure of its place."""
+    new = math.log(metres_per_unit)
+    if math.isnan(motion.told):
+        return replace(motion, told=new)
+    return replace(motion, told=motion.told + min(TOLD_PER_M * distance_m, 1.0) * (new - motion.told))

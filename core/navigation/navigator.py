@@ -18,10 +18,12 @@ from typing import Protocol
 
 import numpy as np
 
+from hippodrome.core import se2
 from hippodrome.core.localization.localizer import Localizer
 from hippodrome.core.navigation import motion as motions
 from hippodrome.core.navigation import track as tracks
 from hippodrome.core.navigation.config import NavigatorConfig
+from hippodrome.core.navigation.course import offset_and_turn, path_poses
 from hippodrome.core.navigation.driving import pace
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
 from hippodrome.core.navigation.placing import keeps_left, lane_of, lane_that_is_read
@@ -35,7 +37,7 @@ from hippodrome.core.navigation.watch import SensorHealth, is_dark, watched
 from hippodrome.core.reading.reader import RoadReader
 from hippodrome.core.reading.types import RoadReading
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import CognitiveMap, LocalizationEstimate, Observation
+from hippodrome.core.types import CognitiveMap, LocalizationEstimate, LocalizationStatus, Observation
 from hippodrome.core.views.odometry import VisualOdometry
 
 __all__ = ["Navigator", "NavigatorConfig", "PoseSource"]
@@ -46,6 +48,11 @@ FORGOTTEN_M = 40.0  # driven without a fix of the localizer, the pose that was s
 STANDING_MPS = 0.1
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
 OBSTACLE_M = 10.0  # who stands nearer than this before something waits for it
+MISFITS = 3  # readings in a row that contradict the pose across the lane, before it is loosened
+AHEAD_M, HALF_BODY_M = (4.5, 10.0), 0.7  # of the path ahead, which must not lead off the road
+OFF_ROAD, OFF_ROAD_FRAMES = 0.35, 2  # share of it that is seen to be no road, in so many frames: the place is wrong
+REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
+BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
 
 
@@ -97,6 +104,9 @@ class Navigator:
         self._has_goal = False
         self._since_look_s = self._apart_s = self._standing_s = self._at_goal_s = 0.0
         self._since_fix_m, self._unfixed_m = 0.0, 0.0
+        self._misfits = self._off_road = 0
+        self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
+        self._refuted_m = 0.0
         self._arrived = False
         self.estimate: LocalizationEstimate | None = None  # the localizer's last answer, for who looks on
 
@@ -136,7 +146,10 @@ class Navigator:
         """Take the self-motion in: the metres that were driven."""
         config = self._config
         known = self.estimate is not None and self.estimate.localized
-        scale = self._localizer.metres_per_unit if known else self._motion.metres_per_unit(self._expected_scale)
+        if known and self.estimate is not None and self.estimate.status is LocalizationStatus.LOCALIZED:
+            driven_m = self._motion.speed_mps * observation.dt_s
+            self._motion = motions.told(self._motion, self._localizer.metres_per_unit, driven_m)
+        scale = self._motion.metres_per_unit(self._expected_scale)
         seen_mps = None
         if self._odometry is not None:
             seen_mps = self._odometry.step(observation).speed
@@ -149,6 +162,8 @@ class Navigator:
             self._ground.see(observation.frame, radar.gap_m)
         if self._track is not None:
             self._track = tracks.moved(self._track, distance_m, turned_rad)
+        if self._refuted is not None:
+            self._refuted = tracks.moved(self._refuted, distance_m, turned_rad)
         self._since_fix_m += distance_m
         return distance_m
 
@@ -174,7 +189,7 @@ class Navigator:
         self._unfixed_m = 0.0 if estimate.localized else self._unfixed_m + distance_m
         if self._track is not None and self._unfixed_m > FORGOTTEN_M:
             self._track, self._plan = None, None
-        if not estimate.localized:
+        if not estimate.localized or self._is_refuted(estimate, distance_m):
             return
         if self._track is None:
             self._restart(estimate)
@@ -190,6 +205,16 @@ class Navigator:
             self._track = tracks.with_localizer(self._track, estimate.pose, estimate.covariance)
             self._since_look_s = 0.0
 
+    def _is_refuted(self, estimate: LocalizationEstimate, distance_m: float) -> bool:
+        """Whether the localizer still says what was seen to be wrong."""
+        if self._refuted is None:
+            return False
+        self._refuted_m += distance_m
+        apart_m = float(np.hypot(*(estimate.pose[:2] - self._refuted.pose[:2])))
+        if apart_m > APART_M or self._refuted_m > REFUTED_M:
+            self._refuted = None
+        return self._refuted is not None
+
     def _restart(self, estimate: LocalizationEstimate) -> None:
         self._track, self._plan = tracks.begun(estimate.pose, estimate.covariance), None
         self._apart_s = self._since_fix_m = 0.0
@@ -201,7 +226,10 @@ class Navigator:
         if self._plan is not None:
             self._plan = advanced(self._plan, self._track.pose)
         reading = self._reading
-        if reading is None or observation.speed == 0.0:
+        if observation.frame is None or observation.speed == 0.0:
+            return
+        self._check_by_sight()
+        if reading is None or self._track is None:
             return
         place = self._planner.lane_place(self._plan, self._track.pose)
         network = self._planner.roads.network
@@ -210,10 +238,39 @@ class Navigator:
         read = lane_that_is_read(self._planner.roads, self._track.pose, place, reading) if reading.sees_lane else place
         left = np.array([-math.sin(read.heading_rad), math.cos(read.heading_rad)])
         point_m = self._track.pose[:2] - read.offset_m * left
-        self._track, _ = tracks.with_lane(self._track, reading, point_m, read.heading_rad)
+        self._track, fits = tracks.with_lane(self._track, reading, point_m, read.heading_rad)
+        self._misfits = 0 if fits else self._misfits + 1
+        if self._misfits >= MISFITS:
+            self._track, self._misfits = tracks.loosened(self._track, read.heading_rad), 0
         if not len(network.successors(place.lane)) or network.is_internal[network.successors(place.lane)].any():
             to_end_m = float(self._planner.roads.lane_length_m[place.lane]) - place.position_m
             self._track, _ = tracks.with_end(self._track, reading, to_end_m, read.heading_rad)
+
+    def _check_by_sight(self) -> None:
+        """Compare the path with the ground: it must not lead off the road, and in a near turn the border tells the offset."""
+        plan, track = self._plan, self._track
+        if plan is None or track is None:
+            return
+        ahead = se2.between(track.pose, path_poses(plan.course, plan.u_m + AHEAD_M[0], plan.u_m + AHEAD_M[1]))
+        left = np.stack([-np.sin(ahead[:, 2]), np.cos(ahead[:, 2])], axis=1)
+        points = np.concatenate([ahead[:, :2] + aside * left for aside in (-HALF_BODY_M, 0.0, HALF_BODY_M)])
+        self._off_road = self._off_road + 1 if self._ground.off_road_share(points) > OFF_ROAD else 0
+        if self._off_road >= OFF_ROAD_FRAMES:
+            assert self.estimate is not None
+            self._refuted, self._refuted_m = tracks.begun(self.estimate.pose, self.estimate.covariance), 0.0
+            self._track = self._plan = None
+            self._off_road = 0
+            return
+        gate = plan.gate()
+        near_turn = Indicator.RIGHT if self._side < 0.0 else Indicator.LEFT
+        if gate is None or gate.indicator is not near_turn or not gate.entry_u_m - 1.0 < plan.u_m < gate.exit_u_m + 1.0:
+            return
+        border_m = self._ground.border_m(self._side)
+        if math.isfinite(border_m):
+            offset_m, turn_rad = offset_and_turn(plan.course, track.pose, plan.u_m)
+            seen_m = self._side * (self._memory.beside_m - border_m)
+            heading = float(track.pose[2]) - turn_rad
+            self._track, _ = tracks.beside_border(track, seen_m - offset_m, heading, BORDER_SIGMA_M)
 
     def _decide(self, radar: Radar, dt_s: float) -> Command:
         """The command of the present state."""

@@ -11,11 +11,13 @@ from hippodrome.core.navigation.config import DriveConfig, VehicleShape
 from hippodrome.core.navigation.course import indicated
 from hippodrome.core.navigation.junctions import gate_speed_mps
 from hippodrome.core.navigation.sight import STEP_M, Ground
+from hippodrome.core.navigation.speed import stopping_mps
 from hippodrome.core.navigation.steering import lane_curvature_1pm
 from hippodrome.core.navigation.types import Indicator, Radar
 from hippodrome.core.reading.types import LaneEnd, RoadReading
 
 BESIDE_M = 1.35  # from the edge line to the middle of a lane of 3.2 m whose line is painted inside of the border
+PREVIEW_S = 0.25  # the wheels take their time to turn
 LOOK_M = 14.0  # of the way ahead
 CORNER_RAD = 0.3  # a way that has turned so much goes round a corner
 BESIDE_RANGE_M = (0.9, 1.9)  # what that distance can be
@@ -23,6 +25,7 @@ FRESH_M = 2.5  # a lane that was read is steered by for so long
 FORGOTTEN_M = 8.0  # after so long without a reading, any reading is believed
 JUMP_M = 0.6  # readings that differ by more are of different lanes
 STRAIGHT_M = 6.0  # without a corner so far ahead, the lane that is read is steered by, and not the border
+FREE_MARGIN_M = -1.5  # the way along the border cuts corners of what is no road by a cell or two
 BLIND_M = 5.0  # the way is driven so far without a border beside it, at walking pace
 SURE_M2 = 0.03  # variance of an offset in the lane that is steered by
 
@@ -95,7 +98,7 @@ def search_step(
     """The next step along the border on the own ``side``: -1 right, +1 left."""
     way = ground.way(side, memory.beside_m, LOOK_M)
     bends, turned = way.curvature_1pm, way.heading_rad - way.heading_rad[0]
-    near = min(int((1.0 + 0.35 * speed_mps) / STEP_M), len(bends) - 1)
+    near = min(int(PREVIEW_S * speed_mps / STEP_M), len(bends) - 1)
     curvature = float(bends[near])
     straight = bool(np.max(np.abs(turned[: int(STRAIGHT_M / STEP_M)])) < CORNER_RAD)
     if memory.is_fresh and straight:
@@ -106,6 +109,9 @@ def search_step(
     ahead = np.abs(bends[int(first_m / STEP_M) :])
     braking = 2.0 * config.braking_mps2 * (first_m + STEP_M * np.arange(len(ahead)))
     wanted = min(wanted, float(np.min(np.sqrt(config.lateral_mps2 / np.maximum(ahead, 1e-3) + braking))))
+    if way.free_m < LOOK_M:
+        ahead_mps = stopping_mps(way.free_m - vehicle.front_m - FREE_MARGIN_M, config.braking_mps2)
+        wanted, reason = (ahead_mps, "sees no road ahead") if ahead_mps < wanted else (wanted, reason)
     if not np.any(way.seen[: int(BLIND_M / STEP_M)]):
         wanted, reason = min(wanted, config.creep_mps), "sees no border of the road"
     to_stop_m = _to_stop_m(turned, reading, vehicle)

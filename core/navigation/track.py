@@ -16,13 +16,14 @@ from hippodrome.core.reading.types import LaneEnd, RoadReading
 from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
-ALONG_SHARE = 0.03  # of each step: what the distance is wrong by, beside the scale's own error
+ALONG_PER_M = 0.02  # variance along the way that each metre adds: the scale is known to a few per cent
 HEADING_RAD_PER_SQRT_M = 0.003  # random walk of the heading
 SIDE_RAD = 0.005  # drift across per metre
-LOCALIZED_M, LOCALIZED_RAD = (1.5, 0.9), 0.06  # of the localizer's pose along and across: its errors repeat for tens of metres
+LOCALIZED_M, LOCALIZED_RAD = (3.0, 3.0), 0.15  # of the localizer's pose, each time: its errors repeat for tens of metres
 LANE_FLOOR_M, LANE_FLOOR_RAD = 0.08, 0.02  # a lane read from a frame is not better than that
 END_FLOOR_M = {LaneEnd.STOP_LINE: 0.4, LaneEnd.MOUTH: 1.0}  # nor where a stop line or a mouth lies
 STOP_LINE_BEFORE_END_M = 0.9  # the near edge of a stop line, before the end of the lane
+LOOSE_M, LOOSE_RAD = 1.0, 0.1  # how wrong a pose may be that the lanes contradict
 GATE = 9.0  # squared standard deviations that a measurement of the lane may be off
 END_GATE_M = 4.0  # and metres that an end of the lane may be off: there is another junction beyond
 
@@ -53,8 +54,7 @@ def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
     slope = np.eye(3)
     slope[0, 2], slope[1, 2] = -step[1], step[0]
     far = abs(distance_m)
-    along, aside = ALONG_SHARE * far, SIDE_RAD * far
-    noise = _turned(pose[2], along**2, aside**2, HEADING_RAD_PER_SQRT_M**2 * far + (0.01 * turned_rad) ** 2)
+    noise = _turned(pose[2], ALONG_PER_M * far, (SIDE_RAD * far) ** 2, HEADING_RAD_PER_SQRT_M**2 * far + (0.01 * turned_rad) ** 2)
     return Track(pose, slope @ track.covariance @ slope.T + noise)
 
 
@@ -98,6 +98,17 @@ def with_end(track: Track, reading: RoadReading, to_end_m: float, lane_heading_r
         return track, False
     along = np.array([math.cos(lane_heading_rad), math.sin(lane_heading_rad), 0.0])
     return _measured(track, along, nearer_m, reading.end_variance_m2 + END_FLOOR_M[reading.end] ** 2)
+
+
+def loosened(track: Track, heading_rad: float) -> Track:
+    """The track as it is where lanes that are read again and again tell that it is wrong across."""
+    return Track(track.pose, track.covariance + _turned(heading_rad, 0.0, LOOSE_M**2, LOOSE_RAD**2))
+
+
+def beside_border(track: Track, offset_m: float, heading_rad: float, sigma_m: float) -> tuple[Track, bool]:
+    """The track after the border beside the path told that the vehicle is ``offset_m`` to the left of where it is believed."""
+    aside = np.array([-math.sin(heading_rad), math.cos(heading_rad), 0.0])
+    return _measured(track, aside, offset_m, sigma_m**2)
 
 
 def _measured(track: Track, row: FloatArray, innovation: float, variance: float) -> tuple[Track, bool]:

@@ -6,20 +6,28 @@ import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
+from hippodrome._files import PACKAGE, code_sha256
 from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.refinement.refine import refine
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap
 from hippodrome.eval.methods.materials import refine_config
 from hippodrome.eval.methods.stages import map_recording
-from hippodrome.eval.reuse import figure_code_sha256
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.record import RecordingPlan, finish
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.survey import with_survey_error
+
+
+MAP_CODE: Final = (  # all code that a map comes from, beside that of its recording: who drives on it changes no map
+    "core/*.py",
+    *(f"core/{room}/**/*.py" for room in ("attractors", "mapping", "matching", "refinement", "roads", "solvers", "views")),
+    "proto/**/*.py",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +43,7 @@ class MapTask:
     def key(self) -> str:
         """A name for all that the map's bytes depend on."""
         kept = self.scenario.model_dump(mode="json", include={"mapper", "refine", "noise"})
-        what = json.dumps([self.plan().content(), kept, figure_code_sha256()], sort_keys=True, default=str)
+        what = json.dumps([self.plan().content(), kept, code_sha256(PACKAGE, MAP_CODE)], sort_keys=True, default=str)
         return hashlib.sha256(what.encode()).hexdigest()[:16]
 
     def file(self) -> Path:

@@ -1,8 +1,8 @@
 """Lines that run side by side are concentric circles: which direction and bend at the rear axle explains most of the ridges.
 
 With the direction ``a`` of the lane at the rear axle and its curvature ``k``, a point that lies ``t`` along that direction and
-``n`` to the left of it lies on the circle that passes the axle at ``c = (2 n - k (t^2 + n^2)) / (1 + sqrt(1 - 2 k n + k^2 (t^2 + n^2)))``
-to its left. Points of one line share one ``c``. Roads that begin to bend need the change of curvature ``k'`` along the lane too,
+``n`` to the left of it lies on the circle that passes the axle to its left at
+``c = (2 n - k (t^2 + n^2)) / (1 + sqrt(1 - 2 k n + k^2 (t^2 + n^2)))``. Points of one line share one ``c``. Roads that begin to bend need the change of curvature ``k'`` along the lane too,
 which takes ``k' t^3 / 6`` from ``c``.
 """
 

@@ -19,6 +19,12 @@ BRIGHTER: Final = 0.38  # log of how much brighter kerb, pavement and gravel are
 BRIGHTER_SPREAD: Final = 0.13  # .. and its spread, also that of one lane's asphalt against the next one's
 LONGER_SPREAD_M: Final = 0.5  # of the length along which a line is seen
 FEW_ROWS: Final = 15.0  # a line seen in fewer rows tells less of its kind
+SUREST: Final = 7.0  # log odds: no line is so surely of a kind that the next road cannot be another
+SIDES: Final = (1, -1)  # left, right
+ENOUGH: Final = 25.0  # ridges that a border needs to be one; more do not make it more likely
+USUAL: Final = 4.0  # ridges that a lane of the expected width is worth
+WIDTH_ERROR_M: Final = 0.07  # of a width as it is measured
+ALONE: Final = 1.0  # log odds against a lane with the road's edge on both sides
 TOLD_M: Final = 4.5  # after so many metres all that is beside the axle has been ahead of the camera
 ALONG_RAD: Final = 0.2  # a lane in which the vehicle is heads no more aside than this
 BESIDE_M: Final = 0.4  # from the axle along the lane to a piece of its border that lies beside it
@@ -63,10 +69,6 @@ def edge_odds(lines: Lines, k: int, side: int, config: ReaderConfig) -> float:
     return float(weight * (min(max(surface, -1.5), 2.5) + min(max(longer, -1.0), 4.0)))
 
 
-def _probability(odds: float) -> float:
-    return 1.0 / (1.0 + math.exp(-max(min(odds, 8.0), -8.0)))
-
-
 def place_in_lane(
     lines: Lines, width_m: float, width_sigma_m: float, told: dict[int, float], config: ReaderConfig
 ) -> Place | None:
@@ -74,46 +76,86 @@ def place_in_lane(
 
     ``told`` are the log odds that the frames before gave for the border on each side to be the road's edge.
     """
-    best: tuple[float, int, int] | None = None
-    counts = np.bincount(lines.owner[lines.owner >= 0].astype(np.int64), minlength=len(lines.places_m))
     candidates = [k for k in range(len(lines.places_m)) if abs(lines.places_m[k]) < FARTHEST_M]
-    odds = {(k, side): edge_odds(lines, k, side, config) + told.get(side, 0.0) for k in candidates for side in (1, -1)}
-    edges = {key: _probability(value) for key, value in odds.items()}
-    at = {(k, side): float(lines.places_m[k]) + side * config.edge_inset_m * edges[k, side] for k, side in edges}
-    for left in [*candidates, -1]:
-        for right in [*candidates, -1]:
-            if left == right or (left >= 0 and at[left, 1] < 0.0) or (right >= 0 and at[right, -1] > 0.0):
-                continue
-            score = sum(min(float(counts[k]), 25.0) for k in (left, right) if k >= 0)
-            if left >= 0 and right >= 0:
-                width = at[left, 1] - at[right, -1]
-                if not NARROWEST_M < width < WIDEST_M:
-                    continue
-                score += 4.0 - 4.0 * ((width - width_m) / WIDTH_SPREAD_M) ** 2
-            if best is None or score > best[0]:
-                best = score, left, right
-    if best is None:
+    odds = {
+        (k, side): max(min(edge_odds(lines, k, side, config) + told.get(side, 0.0), SUREST), -SUREST)
+        for k in candidates
+        for side in SIDES
+    }
+    chosen = _borders(lines, candidates, odds, width_m, config)
+    if chosen is None:
         return None
-    sides = [(k, side) for k, side in ((best[1], 1), (best[2], -1)) if k >= 0]
+    sides = [(k, side) for k, side in zip(chosen, SIDES, strict=True) if k >= 0]
+    painted = [float(lines.places_m[k]) for k, _ in sides]
     share = 1.0 / len(sides)
     gradient = share * np.sum([lines.about[k, 1:] for k, _ in sides], axis=0)
     variance = GRADE**2 * (
         float(gradient @ lines.covariance @ gradient) + share**2 * sum(1.0 / float(lines.about[k, 0]) for k, _ in sides)
     )
-    variance += share**2 * config.edge_inset_m**2 * sum(edges[s] * (1.0 - edges[s]) for s in sides)
-    middle, width = sum(at[s] for s in sides) * share, math.nan
     if len(sides) == 1:
-        middle -= 0.5 * sides[0][1] * width_m
-        variance += (0.5 * width_sigma_m) ** 2
+        side = sides[0][1]
+        edge = 1.0 / (1.0 + math.exp(-odds[sides[0]]))
+        middle = painted[0] + side * (config.edge_inset_m * edge - 0.5 * width_m)
+        variance += config.edge_inset_m**2 * edge * (1.0 - edge) + (0.5 * width_sigma_m) ** 2
+        width = math.nan
     else:
-        width = at[sides[0]] - at[sides[1]]
-    return Place(middle, variance, width, best[1], best[2], {side: odds[k, side] for k, side in sides})
+        shift, shift_variance, widening = _insets(
+            painted[0] - painted[1], odds[sides[0]], odds[sides[1]], width_m, width_sigma_m, config
+        )
+        middle, width = 0.5 * (painted[0] + painted[1]) + shift, painted[0] - painted[1] + widening
+        variance += shift_variance
+    return Place(middle, variance, width, chosen[0], chosen[1], {side: odds[k, side] for k, side in sides})
+
+
+def _borders(
+    lines: Lines, candidates: list[int], odds: dict[tuple[int, int], float], width_m: float, config: ReaderConfig
+) -> tuple[int, int] | None:
+    """Rows of the left and the right border (-1: not seen): those with the most ridges whose distance a lane's width can be."""
+    counts = np.bincount(lines.owner[lines.owner >= 0].astype(np.int64), minlength=len(lines.places_m))
+    at = {key: float(lines.places_m[key[0]]) + (key[1] * config.edge_inset_m if odds[key] > 0.0 else 0.0) for key in odds}
+    best, chosen = -math.inf, None
+    for left in [*candidates, -1]:
+        for right in [*candidates, -1]:
+            if left == right or (left >= 0 and at[left, 1] < 0.0) or (right >= 0 and at[right, -1] > 0.0):
+                continue
+            score = sum(min(float(counts[k]), ENOUGH) for k in (left, right) if k >= 0)
+            if left >= 0 and right >= 0:
+                width = at[left, 1] - at[right, -1]
+                if not NARROWEST_M < width < WIDEST_M:
+                    continue
+                score += USUAL - USUAL * ((width - width_m) / WIDTH_SPREAD_M) ** 2
+            if score > best:
+                best, chosen = score, (left, right)
+    return chosen
+
+
+def _insets(
+    apart_m: float, left_odds: float, right_odds: float, width_m: float, width_sigma_m: float, config: ReaderConfig
+) -> tuple[float, float, float]:
+    """By how much the middle lies off that of the two lines, the variance of this, and how much wider the lane is.
+
+    A line at the road's edge lies inside of the lane's border. Which of the two are such lines is told by their looks, by the
+    usual width of the lane, and by roads that mostly have room for two.
+    """
+    total = mean = square = widening = 0.0
+    for left in (0, 1):
+        for right in (0, 1):
+            width = apart_m + config.edge_inset_m * (left + right)
+            misfit = (width - width_m) ** 2 / (width_sigma_m**2 + WIDTH_ERROR_M**2)
+            weight = math.exp(left * left_odds + right * right_odds - ALONE * left * right - 0.5 * min(misfit, 50.0))
+            shift = 0.5 * config.edge_inset_m * (left - right)
+            total += weight
+            mean += weight * shift
+            square += weight * shift**2
+            widening += weight * config.edge_inset_m * (left + right)
+    mean /= total
+    return mean, max(square / total - mean**2, 0.0), widening / total
 
 
 def beside_the_axle(lines: Lines, place: Place, told_m: float) -> bool:
     """Whether the rear axle is in the lane that was read, and not yet before it or past its end.
 
-    ``told_m`` is how far back what was seen is known. Without it, a lane that the vehicle heads along is taken to begin behind it.
+    ``told_m`` is how far back what was seen is known. Without it, a lane that the vehicle heads along begins behind it.
     """
     if abs(float(lines.arc[0])) > ALONG_RAD:
         return False

@@ -15,7 +15,6 @@ AHEAD_M: Final = 9.0  # nothing farther than this gets out of sight from one fra
 MOST: Final = 240  # ridges kept
 DRIFT: Final = 0.04  # growth of the error per metre moved, as metres per pixel of a ridge: 1.2 cm
 TOLD_M: Final = 6.0  # over which the belief in what a line was taken for fades
-SUREST: Final = 7.0  # log odds: no line is so surely of a kind that the next road cannot be another
 EMPTY: Final = np.zeros((0, 5))
 
 
@@ -40,7 +39,7 @@ class Memory:
             return
         self.told_m += abs(moved_m)
         fades = math.exp(-abs(moved_m) / TOLD_M)
-        self.edges = {side: fades * min(max(odds, -SUREST), SUREST) for side, odds in self.edges.items()}
+        self.edges = {side: fades * odds for side, odds in self.edges.items()}
         cos, sin = math.cos(turned_rad), math.sin(turned_rad)
         x = self.ridges[:, 0] - moved_m * math.cos(0.5 * turned_rad)
         y = self.ridges[:, 1] - moved_m * math.sin(0.5 * turned_rad)

@@ -10,12 +10,13 @@ import numpy as np
 
 from hippodrome.core.reading.arcs import GRADE, best_arc, fit_arc, line_places
 from hippodrome.core.reading.config import ReaderConfig
+from hippodrome.core.reading.ends import stop_line, strip_levels
 from hippodrome.core.reading.ground import Ground, ground_of
 from hippodrome.core.reading.lane import Lines, Place, beside_the_axle, place_in_lane
 from hippodrome.core.reading.memory import Memory
 from hippodrome.core.reading.ridges import find_ridges, trust_of
 from hippodrome.core.reading.traits import line_traits
-from hippodrome.core.reading.types import RoadReading
+from hippodrome.core.reading.types import LaneEnd, RoadReading
 from hippodrome.core.types import Float32Array, Frame
 from hippodrome.core.views.egomotion.camera import RoadCamera
 
@@ -24,7 +25,9 @@ LEAST_ROWS: Final = 12  # frames that show the road in fewer rows are of no use
 
 
 class RoadReader:
-    """Reads the lane in frames of one camera. Between frames it keeps the width of the lanes that it has seen, and the borders that it has passed."""
+    """Reads the lane in frames of one camera.
+
+    Between frames it keeps the width of the lanes that it has seen, and the borders that it has passed."""
 
     def __init__(self, camera: RoadCamera, config: ReaderConfig | None = None) -> None:
         self._camera, self._config = camera, config or ReaderConfig()
@@ -44,7 +47,8 @@ class RoadReader:
         if len(ground.rows) < LEAST_ROWS:
             return RoadReading()
         self._memory.out_of_sight(ground, self._camera.forward_m)
-        lines = self._lines(self._road(frame, ground), ground)
+        grey = self._road(frame, ground)
+        lines = self._lines(grey, ground)
         place = None
         if lines is not None:
             place = place_in_lane(lines, self._width_m, self._width_sigma_m, self._memory.edges, self._config)
@@ -53,7 +57,11 @@ class RoadReader:
         self._remember(lines, place)
         if not beside_the_axle(lines, place, self._memory.told_m):
             return RoadReading()
+        end = self._end(grey, ground, lines, place)
         return RoadReading(
+            end_m=end[0],
+            end_variance_m2=end[1],
+            end=end[2],
             offset_m=-place.middle_m,
             offset_variance_m2=place.variance_m2,
             heading_rad=-float(lines.arc[0]),
@@ -94,6 +102,16 @@ class RoadReader:
             return None
         traits = line_traits(grey, ground.x_m, ground.y_m, ridges, owner, arc, places)
         return Lines(arc, covariance, places, about, traits, ridges, weight, owner)
+
+    def _end(self, grey: Float32Array, ground: Ground, lines: Lines, place: Place) -> tuple[float, float, LaneEnd]:
+        """Distance of the lane's end, its variance, and what it is."""
+        width_m = place.width_m if math.isfinite(place.width_m) else self._width_m
+        levels, along_m = strip_levels(grey, ground.x_m, ground.y_m, lines.arc, place.middle_m, width_m)
+        paint = float(np.median(lines.ridges[lines.ridges[:, 4] >= 0, 3])) if np.any(lines.ridges[:, 4] >= 0) else 0.0
+        line = stop_line(levels, along_m, self._camera.forward_m, paint, self._config.stop_line_m)
+        if line[1] < math.inf:
+            return line[0], line[1], LaneEnd.STOP_LINE
+        return math.nan, math.inf, LaneEnd.NOTHING
 
     def _remember(self, lines: Lines, place: Place) -> None:
         of_border = (lines.owner >= 0) & np.isin(lines.owner, [place.left, place.right])

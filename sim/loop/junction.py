@@ -108,7 +108,7 @@ def _way_to(
 ) -> tuple[int, float, str] | None:
     """The lane inside the junction that a vehicle will take, its way to there, and the letter of the signal before it."""
     distance = libsumo.lane.getLength(here) - along_m if here else math.inf
-    for onward, via, _, _, _, state, _, length in libsumo.vehicle.getNextLinks(name)[:LINKS_AHEAD]:
+    for onward, _, _, _, via, state, _, length in libsumo.vehicle.getNextLinks(name)[:LINKS_AHEAD]:
         if distance > SIGHT_M:
             return None
         lane = lane_of.get(via, -1)

@@ -150,6 +150,11 @@ class World:
         self._driven_m += travelled
         return self._sensed(travelled, self._car.heading_rad - heading)
 
+    def teleport(self, pose_m: tuple[float, float, float]) -> None:
+        """Stands the ego somewhere else, for tests and experiments; it is there from the next step on."""
+        self._car = Car(*pose_m)
+        self._lane = self._front_lane = self._before = -1
+
     def _start(self, start: LanePlace | None, rng: np.random.Generator) -> tuple[int, float]:
         """Lane and position of the rear axle at the start."""
         network = self.network

@@ -1,0 +1,125 @@
+"""What is detected and logged: collisions and who is to blame, the wrong way, red signals, rights of way."""
+
+import math
+
+import libsumo
+import pytest
+
+from hippodrome.core.navigation.types import Indicator, Lamp
+from hippodrome.sim.loop.types import EventKind, LanePlace
+from hippodrome.sim.loop.world import World
+from tests.sim.loop import small
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("crossing")
+    with World(small.scenario(town=small.crossing(folder)), folder, draw=False) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def signals_town(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("signals")
+    return small.scenario(town=small.crossing(folder, "traffic_light")), folder
+
+
+def events_of(world, sensed, steps, command):
+    found = []
+    for _ in range(steps):
+        sensed = world.step(*command(sensed))
+        found.extend(sensed.events)
+    return sensed, found
+
+
+def test_running_into_a_standing_car_is_at_fault(world):
+    sensed = world.reset(1, LanePlace("w-c_0", 20.0))
+    small.car("b900", ["w-c", "c-e"], 70.0, standing=True)
+    sensed, found = events_of(world, sensed, 120, lambda s: (1.0, 0.0))
+    assert [(e.kind, e.at_fault, e.other) for e in found][:1] == [(EventKind.COLLISION, True, "b900")]
+    assert found[0].x_m == pytest.approx(70.0 - 120.0 - 4.3 - 3.6, abs=1.0)
+
+
+def test_being_run_into_from_behind_is_not(world):
+    sensed = world.reset(1, LanePlace("w-c_0", 40.0))
+    small.car("b901", ["w-c", "c-e"], 15.0, 6.0)
+    world.step(0.0, 0.0)
+    libsumo.vehicle.setSpeedMode("b901", 0)
+    libsumo.vehicle.setSpeed("b901", 6.0)
+    _, found = events_of(world, sensed, 60, lambda s: (0.0, 0.0))
+    assert [(e.kind, e.at_fault) for e in found] == [(EventKind.COLLISION, False)]
+
+
+def test_wrong_way_is_seen(world):
+    sensed = world.reset(1, LanePlace("c-w_0", 60.0))
+    pose = world.ground.pose_at(sensed.truth.lane, 60.0)
+    world.teleport((pose[0], pose[1], pose[2] + math.pi))
+    _, found = events_of(world, sensed, 40, lambda s: (1.0, 0.0))
+    assert EventKind.WRONG_WAY in {e.kind for e in found}
+
+
+def test_leaving_lane_road_and_paving_is_seen_once_each(world):
+    sensed = world.reset(1, LanePlace("w-c_0", 20.0))
+    _, found = events_of(world, sensed, 60, lambda s: (1.0, -0.06))
+    assert [e.kind for e in found[:3]] == [EventKind.KERB, EventKind.LEFT_LANE, EventKind.LEFT_ROAD]
+    assert len(found) == 3
+
+
+def test_driving_well_brings_no_event(world):
+    for indicator in Indicator:
+        sensed = world.reset(1, LanePlace("w-c_0", 50.0))
+        for _ in range(250):
+            sensed = world.step(*small.keeper(world, sensed, indicator, 5.0), indicator)
+            assert sensed.events == ()
+        edge = {Indicator.LEFT: "c-n", Indicator.STRAIGHT: "c-e", Indicator.RIGHT: "c-s"}[indicator]
+        assert sensed.truth.lane_id == f"{edge}_0"
+
+
+@pytest.mark.parametrize("position_m", [40.0, 50.0, 60.0])
+def test_a_car_yields_to_the_ego(world, position_m):
+    sensed = world.reset(1, LanePlace("w-c_0", position_m))
+    small.car("b902", ["s-c", "c-n"], 40.0, 5.0)
+    _, found = events_of(world, sensed, 200, lambda s: small.keeper(world, s, speed_mps=8.0, gap_m=-99.0))
+    assert found == []
+
+
+def test_the_ego_takes_the_right_of_way_and_is_told_that_the_way_is_not_free(world):
+    sensed = world.reset(1, LanePlace("s-c_0", 70.0))
+    small.car("b903", ["w-c", "c-e"], 30.0, 8.0)
+    free, found = [], []
+    for _ in range(120):
+        sensed = world.step(*small.keeper(world, sensed, speed_mps=5.0, gap_m=-99.0))
+        free.append(sensed.radar.way_is_free)
+        found.extend(sensed.events)
+    assert not all(free)
+    assert EventKind.RIGHT_OF_WAY in {e.kind for e in found}
+
+
+def test_who_waits_until_the_way_is_free_takes_nothing(world):
+    sensed = world.reset(1, LanePlace("s-c_0", 70.0))
+    for k, position in enumerate((0.0, 30.0, 60.0)):
+        small.car(f"b91{k}", ["w-c", "c-e"], position, 8.0)
+    found = []
+    for _ in range(400):
+        accel, steering = small.keeper(world, sensed, speed_mps=5.0)
+        rest = world.ground.lane_length_m(sensed.truth.lane) - sensed.truth.lane_position_m - 3.6
+        if sensed.truth.lane_id == "s-c_0" and not sensed.radar.way_is_free and rest < 8.0:
+            accel = -3.0
+        sensed = world.step(accel, steering)
+        found.extend(sensed.events)
+    assert found == []
+    assert sensed.truth.lane_id in ("c-n_0", "n-c_0")
+
+
+def test_a_red_light_run_is_seen_and_a_green_one_is_none(signals_town):
+    scenario, folder = signals_town
+    kinds, lamps = {}, {}
+    with World(scenario, folder, draw=False) as world:
+        for arm in "ws":
+            sensed = world.reset(1, LanePlace(f"{arm}-c_0", 80.0))
+            lamps[arm] = sensed.radar.lamp
+            _, found = events_of(world, sensed, 100, lambda s: small.keeper(world, s))
+            kinds[arm] = [e.kind for e in found]
+    assert set(lamps.values()) == {Lamp.GREEN, Lamp.RED}
+    for arm, lamp in lamps.items():
+        assert kinds[arm] == ([EventKind.RED_LIGHT] if lamp == Lamp.RED else [])

@@ -55,7 +55,7 @@ class DriveConfig:
     speed_gain_1ps: float = 1.5
     headway_s: float = 1.4  # of the intelligent driver model (Treiber, Hennecke and Helbing, 2000)
     jam_gap_m: float = 2.5  # and its gap at rest
-    stop_before_m: float = 1.3  # the bumper stands so far before the end of the lane: a stop line ends half a metre before it
+    stop_before_m: float = 1.8  # the bumper stands so far before the end of the lane: a stop line begins .9 m before it
     goal_tolerance_m: float = 0.5  # the rear axle is held to stand at the goal within this
     goal_sigma_m: float = 1.5  # an arrival is said only if the position is known this well: twice that is the goal's 3 m
     settled_m: float = 30.0  # and if the fix has held over this distance

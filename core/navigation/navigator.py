@@ -49,10 +49,12 @@ STANDING_MPS = 0.1
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
 OBSTACLE_M = 10.0  # who stands nearer than this before something waits for it
 MISFITS = 3  # readings in a row that contradict the pose across the lane, before it is loosened
-AHEAD_M, HALF_BODY_M = (4.5, 10.0), 0.7  # of the path ahead, which must not lead off the road
-OFF_ROAD, OFF_ROAD_FRAMES = 0.35, 2  # share of it that is seen to be no road, in so many frames: the place is wrong
+AHEAD_M, HALF_BODY_M = (5.0, 13.0), 0.7  # of the path ahead, which must not lead off the road
+OFF_ROAD, OFF_ROAD_FRAMES = 0.3, 3  # share of it that is seen to be no road, in so many frames: the place is wrong ..
+LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehicle may be so much farther on, or less far
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
+CREEP_AFTER_S = 4.0  # stood without a road ahead and with nobody there, one creeps on
 ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
 
 
@@ -102,7 +104,7 @@ class Navigator:
         self._track: Track | None = None
         self._plan: Plan | None = None
         self._has_goal = False
-        self._since_look_s = self._apart_s = self._standing_s = self._at_goal_s = 0.0
+        self._since_look_s = self._apart_s = self._standing_s = self._at_goal_s = self._search_stood_s = 0.0
         self._since_fix_m, self._unfixed_m = 0.0, 0.0
         self._misfits = self._off_road = 0
         self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
@@ -189,8 +191,8 @@ class Navigator:
         self._unfixed_m = 0.0 if estimate.localized else self._unfixed_m + distance_m
         if self._track is not None and self._unfixed_m > FORGOTTEN_M:
             self._track, self._plan = None, None
-        if not estimate.localized or self._is_refuted(estimate, distance_m):
-            return
+        if estimate.status is not LocalizationStatus.LOCALIZED or self._is_refuted(estimate, distance_m):
+            return  # off the map the localizer has dead reckoning alone, and here there are lanes and stop lines beside it
         if self._track is None:
             self._restart(estimate)
             return
@@ -254,7 +256,10 @@ class Navigator:
         ahead = se2.between(track.pose, path_poses(plan.course, plan.u_m + AHEAD_M[0], plan.u_m + AHEAD_M[1]))
         left = np.stack([-np.sin(ahead[:, 2]), np.cos(ahead[:, 2])], axis=1)
         points = np.concatenate([ahead[:, :2] + aside * left for aside in (-HALF_BODY_M, 0.0, HALF_BODY_M)])
-        self._off_road = self._off_road + 1 if self._ground.off_road_share(points) > OFF_ROAD else 0
+        shift_m, share = self._ground.best_shift_m(points, min(LEAST_SHIFT_M + 2.0 * track.sigma_m, MOST_SHIFT_M))
+        self._off_road = self._off_road + 1 if share > OFF_ROAD else 0
+        if shift_m != 0.0 and self._off_road == 0:
+            self._track, _ = tracks.farther_on(track, shift_m, SHIFT_SIGMA_M)
         if self._off_road >= OFF_ROAD_FRAMES:
             assert self.estimate is not None
             self._refuted, self._refuted_m = tracks.begun(self.estimate.pose, self.estimate.covariance), 0.0
@@ -280,7 +285,7 @@ class Navigator:
         if self._arrived:
             return self._standing(DrivingState.ARRIVED, "has arrived")
         self._keep_plan()
-        command = self._searching(radar) if self._plan is None else self._driving(radar, dt_s)
+        command = self._searching(radar, dt_s) if self._plan is None else self._driving(radar, dt_s)
         if complaint:
             limit = 0.0 if halt else self._config.drive.search_mps / 2.0
             slowed = min(command.acceleration_mps2, self._config.drive.speed_gain_1ps * (limit - self._motion.speed_mps))
@@ -299,9 +304,10 @@ class Navigator:
         if self._plan is None and lane_of(self._planner.roads, self._track.pose) is not None:
             self._plan = self._planner.plan(self._track.pose, self._motion.speed_mps)
 
-    def _searching(self, radar: Radar) -> Command:
+    def _searching(self, radar: Radar, dt_s: float) -> Command:
         """On sight along the border."""
         config, speed = self._config, self._motion.speed_mps
+        self._search_stood_s = self._search_stood_s + dt_s if speed < 2.0 * config.drive.creep_mps else 0.0
         step = search_step(self._ground, self._memory, self._reading, radar, self._side, speed, config.drive, config.vehicle)
         accel = min(
             approach_mps2(speed, step.speed_mps, config.drive), following_mps2(speed, radar, config.drive, config.vehicle)

@@ -25,6 +25,7 @@ FRESH_M = 2.5  # a lane that was read is steered by for so long
 FORGOTTEN_M = 8.0  # after so long without a reading, any reading is believed
 JUMP_M = 0.6  # readings that differ by more are of different lanes
 STRAIGHT_M = 6.0  # without a corner so far ahead, the lane that is read is steered by, and not the border
+CREEP_GAP_M = 4.0
 FREE_MARGIN_M = -1.5  # the way along the border cuts corners of what is no road by a cell or two
 BLIND_M = 5.0  # the way is driven so far without a border beside it, at walking pace
 SURE_M2 = 0.03  # variance of an offset in the lane that is steered by
@@ -89,6 +90,7 @@ class SearchStep:
     speed_mps: float
     indicator: Indicator
     reason: str
+    may_creep: bool  # only the road itself is in question: nobody has to be let pass, and nothing is near
 
 
 def search_step(
@@ -120,7 +122,8 @@ def search_step(
         slowed, why = config.search_mps / 2.0, "a junction is ahead"
     if slowed < wanted:
         wanted, reason = slowed, why
-    return SearchStep(curvature, wanted, indicated(float(turned[-1])), reason)
+    may_creep = not why and radar.gap_m > CREEP_GAP_M
+    return SearchStep(curvature, wanted, indicated(float(turned[-1])), reason, may_creep)
 
 
 def _to_stop_m(turned_rad: np.ndarray, reading: RoadReading | None, vehicle: VehicleShape) -> float:  # type: ignore[type-arg]

@@ -28,12 +28,16 @@ COLOURFUL = 0.16  # difference between a pixel's colours, relative to its level,
 PATCH_M = (5.5, 0.9)  # the asphalt right ahead: so far ahead of the rear axle and to either side
 STEADY = 0.85  # weight of the past in the level of the asphalt
 
+FITS_SHARE = 0.1  # of a path that may seem to be no road: its cells are as coarse as that
+SHIFT_STEP_M = 0.5
+
 STEP_M = 0.25  # of the way along the border
 REACH_M = 3.4  # how far aside the border is looked for
-NEAR_M, BEYOND_M = 1.0, 2.5  # ahead of the vehicle where it is looked for
+NEAR_M, BEYOND_M = 0.5, 1.8  # ahead of the vehicle where it is looked for; farther on, a sharp corner would be cut
+AWAY_M = (3.2, 4.2)  # no road so far straight ahead: the road bends away from the own side
 DECAY_M = 2.6  # distance over which an offset from the way fades
-TIGHTEST_1PM = 0.165  # a corner's kerb has a radius of 6 m, the lane's middle 7.6 m
-BEND_PER_STEP = 0.05
+TIGHTEST_1PM = 0.29  # a little less than the turning circle
+BEND_PER_STEP = 0.06
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,6 +137,24 @@ class Ground:
         found = float(_border_m(self._cells, self._origin_m, x, y, self.pose[2], side))
         return found if 0.0 <= found < REACH_M else math.nan
 
+    def best_shift_m(self, points_m: FloatArray, most_m: float) -> tuple[float, float]:
+        """By how much points (n, 2) in the vehicle's axes have to come nearer to lie on the road, and which share then does not.
+
+        The least shift of at most ``most_m`` either way that is good enough counts; 0 if they lie on the road as they are.
+        """
+        share = self.off_road_share(points_m)
+        if share <= FITS_SHARE:
+            return 0.0, share
+        best = (0.0, share)
+        for k in range(1, int(most_m / SHIFT_STEP_M) + 1):
+            for shift_m in (k * SHIFT_STEP_M, -k * SHIFT_STEP_M):
+                share = self.off_road_share(points_m - np.array([shift_m, 0.0]))
+                if share <= FITS_SHARE:
+                    return shift_m, share
+                if share < best[1] - 0.05:
+                    best = shift_m, share
+        return best
+
     def off_road_share(self, points_m: FloatArray) -> float:
         """Which share of points (n, 2) in the vehicle's axes is known to be no road, of those that are known."""
         cos, sin = math.cos(self.pose[2]), math.sin(self.pose[2])
@@ -205,15 +227,20 @@ def _along_border(
         near = _border_m(cells, origin, x + NEAR_M * cos, y + NEAR_M * sin, heading, side)
         far = _border_m(cells, origin, x + BEYOND_M * cos, y + BEYOND_M * sin, heading, side)
         wanted = bend
-        if near >= 0.0 and far >= 0.0:
+        recedes = near >= 0.0 and far > near + 0.4
+        ahead_is_road = False
+        for away in AWAY_M:
+            if _kind_at(cells, origin, x + away * cos, y + away * sin) != OTHER:
+                ahead_is_road = True
+        if not ahead_is_road and not recedes:
+            wanted = -side * TIGHTEST_1PM
+        elif near >= 0.0 and far >= 0.0:
             out = math.atan2(far - near, BEYOND_M - NEAR_M)  # by how much the border leads away to its side
             wanted = side * ((near - beside_m) / DECAY_M**2 + 2.0 * out / DECAY_M)
         elif near >= 0.0:
             wanted = side * (near - beside_m) / DECAY_M**2
         elif far >= 0.0:
             wanted = side * (far - beside_m) / DECAY_M**2
-        elif near < 0.0 and far < 0.0:
-            wanted = 0.0  # paint across the lane
         wanted = min(max(wanted, -TIGHTEST_1PM), TIGHTEST_1PM)
         bend += min(max(wanted - bend, -BEND_PER_STEP), BEND_PER_STEP)
         rows[k, 0], rows[k, 1] = bend, heading

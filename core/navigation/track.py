@@ -105,6 +105,12 @@ def loosened(track: Track, heading_rad: float) -> Track:
     return Track(track.pose, track.covariance + _turned(heading_rad, 0.0, LOOSE_M**2, LOOSE_RAD**2))
 
 
+def farther_on(track: Track, ahead_m: float, sigma_m: float) -> tuple[Track, bool]:
+    """The track after the ground told that the vehicle is ``ahead_m`` farther along its heading than believed."""
+    along = np.array([math.cos(track.pose[2]), math.sin(track.pose[2]), 0.0])
+    return _measured(track, along, ahead_m, sigma_m**2)
+
+
 def beside_border(track: Track, offset_m: float, heading_rad: float, sigma_m: float) -> tuple[Track, bool]:
     """The track after the border beside the path told that the vehicle is ``offset_m`` to the left of where it is believed."""
     aside = np.array([-math.sin(heading_rad), math.cos(heading_rad), 0.0])

@@ -308,7 +308,10 @@ class Navigator:
         """On sight along the border."""
         config, speed = self._config, self._motion.speed_mps
         self._search_stood_s = self._search_stood_s + dt_s if speed < 2.0 * config.drive.creep_mps else 0.0
-        step = search_step(self._ground, self._memory, self._reading, radar, self._side, speed, config.drive, config.vehicle)
+        bend = math.tan(self._motion.steering_rad) / config.vehicle.wheelbase_m
+        step = search_step(
+            self._ground, self._memory, self._reading, radar, self._side, speed, bend, config.drive, config.vehicle
+        )
         accel = min(
             approach_mps2(speed, step.speed_mps, config.drive), following_mps2(speed, radar, config.drive, config.vehicle)
         )

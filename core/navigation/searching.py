@@ -16,6 +16,7 @@ from hippodrome.core.navigation.steering import lane_curvature_1pm
 from hippodrome.core.navigation.types import Indicator, Radar
 from hippodrome.core.reading.types import LaneEnd, RoadReading
 
+KERB_M = 1.6  # from what is no road to the middle of such a lane
 BESIDE_M = 1.35  # from the edge line to the middle of a lane of 3.2 m whose line is painted inside of the border
 PREVIEW_S = 0.25  # the wheels take their time to turn
 LOOK_M = 14.0  # of the way ahead
@@ -27,6 +28,7 @@ JUMP_M = 0.6  # readings that differ by more are of different lanes
 STRAIGHT_M = 6.0  # without a corner so far ahead, the lane that is read is steered by, and not the border
 CREEP_GAP_M = 4.0
 FREE_MARGIN_M = -1.5  # the way along the border cuts corners of what is no road by a cell or two
+SEARCH_LATERAL = 0.6  # of the lateral acceleration: corners that nobody knows are taken slowly
 BLIND_M = 5.0  # the way is driven so far without a border beside it, at walking pace
 SURE_M2 = 0.03  # variance of an offset in the lane that is steered by
 
@@ -94,11 +96,11 @@ class SearchStep:
 
 
 def search_step(
-    ground: Ground, memory: LaneMemory, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float,
+    ground: Ground, memory: LaneMemory, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float, bend_1pm: float,
     config: DriveConfig, vehicle: VehicleShape,
 ) -> SearchStep:  # fmt: skip
-    """The next step along the border on the own ``side``: -1 right, +1 left."""
-    way = ground.way(side, memory.beside_m, LOOK_M)
+    """The next step along the border on the own ``side``: -1 right, +1 left; ``bend_1pm`` is what the vehicle drives now."""
+    way = ground.way(bend_1pm, side, KERB_M, LOOK_M)
     bends, turned = way.curvature_1pm, way.heading_rad - way.heading_rad[0]
     near = min(int(PREVIEW_S * speed_mps / STEP_M), len(bends) - 1)
     curvature = float(bends[near])
@@ -110,7 +112,7 @@ def search_step(
     first_m = STRAIGHT_M if memory.is_fresh and straight else 0.0  # up to there the lane is driven, and not the border
     ahead = np.abs(bends[int(first_m / STEP_M) :])
     braking = 2.0 * config.braking_mps2 * (first_m + STEP_M * np.arange(len(ahead)))
-    wanted = min(wanted, float(np.min(np.sqrt(config.lateral_mps2 / np.maximum(ahead, 1e-3) + braking))))
+    wanted = min(wanted, float(np.min(np.sqrt(SEARCH_LATERAL * config.lateral_mps2 / np.maximum(ahead, 1e-3) + braking))))
     if way.free_m < LOOK_M:
         ahead_mps = stopping_mps(way.free_m - vehicle.front_m - FREE_MARGIN_M, config.braking_mps2)
         wanted, reason = (ahead_mps, "sees no road ahead") if ahead_mps < wanted else (wanted, reason)

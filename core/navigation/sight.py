@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numba import njit
 
@@ -33,11 +34,19 @@ SHIFT_STEP_M = 0.5
 
 STEP_M = 0.25  # of the way along the border
 REACH_M = 3.4  # how far aside the border is looked for
-NEAR_M, BEYOND_M = 0.5, 1.8  # ahead of the vehicle where it is looked for; farther on, a sharp corner would be cut
-AWAY_M = (3.2, 4.2)  # no road so far straight ahead: the road bends away from the own side
+NEAR_M = 0.5  # ahead of the rear axle, where the distance to the paint is measured
+AHEAD_M = 1.0  # ahead of the rear axle, where the line of equal distance from the border is followed
+SLOPE_M = 0.3  # over which the direction of the border is taken
+AROUND = 80  # cells on each side of the vehicle in which the way is looked for: 16 m
+SPECK = np.ones((3, 3), dtype=np.uint8)  # fewer cells than that are no border, but the rim of a painted line
+STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
+UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
+OTHER_SIDE_1PM = 0.12  # and more so where the other side of the road is nearest
+MOST_TURN_RAD = 1.9
+LEAST_ROOM_M = 0.5  # nearer to what is no road no wheel has room
 DECAY_M = 2.6  # distance over which an offset from the way fades
 TIGHTEST_1PM = 0.29  # a little less than the turning circle
-BEND_PER_STEP = 0.06
+BEND_PER_STEP = 0.07
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,10 +133,17 @@ class Ground:
         near = view.ahead_m < reach
         _enter(self._cells, self._origin_m, self.pose, view.ahead_m[near], view.left_m[near], kind[near])
 
-    def way(self, side: float, beside_m: float, length_m: float) -> Way:
-        """The way that keeps ``beside_m`` from the border on one side: +1 left, -1 right."""
-        rows = _along_border(self._cells, self._origin_m, self.pose, side, beside_m, int(length_m / STEP_M))
-        blocked = np.flatnonzero(rows[:, 3] > 0.0)
+    def way(self, bend_1pm: float, side: float, beside_m: float, length_m: float) -> Way:
+        """The way that keeps ``beside_m`` from what is no road on one side: +1 left, -1 right; it begins with a curvature."""
+        middle = ((self.pose[:2] - self._origin_m) / CELL_M).astype(np.int64)
+        low = np.clip(middle - AROUND, 0, CELLS - 2 * AROUND)
+        part = self._cells[low[0] : low[0] + 2 * AROUND, low[1] : low[1] + 2 * AROUND]
+        other = (part == OTHER).astype(np.uint8)
+        other = cv2.morphologyEx(cv2.morphologyEx(other, cv2.MORPH_OPEN, SPECK), cv2.MORPH_CLOSE, STRIPES)
+        field = CELL_M * cv2.distanceTransform(1 - other, cv2.DIST_L2, 5).astype(np.float64)
+        corner_m = self._origin_m + CELL_M * low
+        rows = _along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, int(length_m / STEP_M))
+        blocked = np.flatnonzero(rows[:, 3] < LEAST_ROOM_M)
         free_m = STEP_M * float(blocked[0] if len(blocked) else len(rows))
         return Way(rows[:, 0], rows[:, 1], rows[:, 2], free_m)
 
@@ -213,39 +229,50 @@ def _border_m(cells: UInt8Array, origin: FloatArray, x: float, y: float, heading
 
 
 @njit(cache=True)
-def _along_border(
-    cells: UInt8Array, origin: FloatArray, pose: FloatArray, side: float, beside_m: float, count: int
-) -> FloatArray:
-    """The way: rows (count, 4) of curvature, heading, whether the border was seen, whether something is in the way.
+def _distance_at(field: FloatArray, corner: FloatArray, x: float, y: float) -> float:
+    """The distance field between its cells' middles; far away beyond its rim."""
+    u, v = (x - corner[0]) / CELL_M - 0.5, (y - corner[1]) / CELL_M - 0.5
+    i, j = math.floor(u), math.floor(v)
+    if i < 0 or j < 0 or i >= field.shape[0] - 1 or j >= field.shape[1] - 1:
+        return 2.0 * REACH_M
+    p, q = u - i, v - j
+    low = (1.0 - q) * field[i, j] + q * field[i, j + 1]
+    high = (1.0 - q) * field[i + 1, j] + q * field[i + 1, j + 1]
+    return float((1.0 - p) * low + p * high)
 
-    At each step the vehicle's law of steering (Samson) acts on the distance to the border and on the border's direction.
+
+@njit(cache=True)
+def _along_border(
+    field: FloatArray, corner: FloatArray, pose: FloatArray, bend: float, side: float, beside_m: float, count: int
+) -> FloatArray:
+    """The way: rows (count, 4) of curvature, heading, whether the border was seen, and the distance to what is no road.
+
+    The vehicle's law of steering (Samson) acts on the line of equal distance from the border: round a sharp corner that line is an
+    arc, and where the road bends away the border comes nearer ahead.
     """
     rows = np.zeros((count, 4))
-    x, y, heading, bend = pose[0], pose[1], pose[2], 0.0
+    x, y, heading = pose[0], pose[1], pose[2]
     for k in range(count):
         cos, sin = math.cos(heading), math.sin(heading)
-        near = _border_m(cells, origin, x + NEAR_M * cos, y + NEAR_M * sin, heading, side)
-        far = _border_m(cells, origin, x + BEYOND_M * cos, y + BEYOND_M * sin, heading, side)
-        wanted = bend
-        recedes = near >= 0.0 and far > near + 0.4
-        ahead_is_road = False
-        for away in AWAY_M:
-            if _kind_at(cells, origin, x + away * cos, y + away * sin) != OTHER:
-                ahead_is_road = True
-        if not ahead_is_road and not recedes:
-            wanted = -side * TIGHTEST_1PM
-        elif near >= 0.0 and far >= 0.0:
-            out = math.atan2(far - near, BEYOND_M - NEAR_M)  # by how much the border leads away to its side
-            wanted = side * ((near - beside_m) / DECAY_M**2 + 2.0 * out / DECAY_M)
-        elif near >= 0.0:
-            wanted = side * (near - beside_m) / DECAY_M**2
-        elif far >= 0.0:
-            wanted = side * (far - beside_m) / DECAY_M**2
+        px, py = x + AHEAD_M * cos, y + AHEAD_M * sin
+        d = _distance_at(field, corner, px, py)
+        gx = _distance_at(field, corner, px + SLOPE_M, py) - _distance_at(field, corner, px - SLOPE_M, py)
+        gy = _distance_at(field, corner, px, py + SLOPE_M) - _distance_at(field, corner, px, py - SLOPE_M)
+        seen = d < REACH_M and gx * gx + gy * gy > 1e-6
+        wanted = side * UNSEEN_1PM
+        if seen:
+            along = math.atan2(gy, gx) + side * 0.5 * math.pi  # the border's direction, with the border on the own side
+            turn = (heading - along + math.pi) % (2.0 * math.pi) - math.pi
+            off = side * (beside_m - min(d, beside_m + 1.0))  # of the vehicle to the left of its line
+            if abs(turn) < MOST_TURN_RAD:
+                wanted = -off / DECAY_M**2 - 2.0 * turn / DECAY_M
+            else:  # what is nearest is the border of the other side
+                wanted = side * OTHER_SIDE_1PM
         wanted = min(max(wanted, -TIGHTEST_1PM), TIGHTEST_1PM)
         bend += min(max(wanted - bend, -BEND_PER_STEP), BEND_PER_STEP)
         rows[k, 0], rows[k, 1] = bend, heading
-        rows[k, 2] = 1.0 if near >= 0.0 or far >= 0.0 else 0.0
-        rows[k, 3] = 1.0 if _kind_at(cells, origin, x + 1.0 * cos, y + 1.0 * sin) == OTHER else 0.0
+        rows[k, 2] = 1.0 if seen else 0.0
+        rows[k, 3] = _distance_at(field, corner, x, y)
         x, y = x + STEP_M * cos, y + STEP_M * sin
         heading += STEP_M * bend
     return rows

@@ -74,7 +74,9 @@ class Film:
             _box(picture, drawn, np.asarray(pose[:3], dtype=np.float64), OTHER, (-2.2, 2.2))
         _box(picture, drawn, np.array(truth.pose_m), EGO, (-0.9, 3.6))
         if navigator.track is not None:
-            cv2.polylines(picture, [drawn(_ellipse_m(navigator.track.pose, navigator.track.covariance))], True, BELIEF, 2, cv2.LINE_AA)
+            cv2.polylines(
+                picture, [drawn(_ellipse_m(navigator.track.pose, navigator.track.covariance))], True, BELIEF, 2, cv2.LINE_AA
+            )
         state = f"{truth.t_s:5.1f} s  {3.6 * truth.speed_mps:3.0f} km/h"
         cv2.putText(picture, state, (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (20, 20, 20), 1, cv2.LINE_AA)
         return picture

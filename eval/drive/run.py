@@ -31,7 +31,7 @@ from hippodrome.eval.results.model import DECIMALS, Network, Results, Row, Scena
 from hippodrome.eval.reuse import figure_code_sha256
 from hippodrome.eval.run import RESULTS, load_scenarios, make_recordings
 from hippodrome.sim.loop.world import World
-from hippodrome.sim.record import RecordingPlan
+from hippodrome.sim.record import RecordingPlan, close_renderer
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario
 
@@ -126,6 +126,7 @@ def run_mission(task: MissionTask) -> dict[str, Any]:
     if (kept := _kept(file)) is not None and (not task.film or task.film_file().exists()):
         return kept
     warm_up()
+    close_renderer()  # that of the recordings: a process has one at a time
     file.parent.mkdir(parents=True, exist_ok=True)
     world = _world(task.scenario, task.out)
     try:

@@ -2,8 +2,8 @@
 
 With the direction ``a`` of the lane at the rear axle and its curvature ``k``, a point that lies ``t`` along that direction and
 ``n`` to the left of it lies on the circle that passes the axle to its left at
-``c = (2 n - k (t^2 + n^2)) / (1 + sqrt(1 - 2 k n + k^2 (t^2 + n^2)))``. Points of one line share one ``c``. Roads that begin to bend need the change of curvature ``k'`` along the lane too,
-which takes ``k' t^3 / 6`` from ``c``.
+``c = (2 n - k (t^2 + n^2)) / (1 + sqrt(1 - 2 k n + k^2 (t^2 + n^2)))``. Points of one line share one ``c``.
+Roads that begin to bend need the change of curvature ``k'`` along the lane too, which takes ``k' t^3 / 6`` from ``c``.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ SWERVE_1PM: Final = 0.0015  # by how much, times the squared distance beyond the
 NEAR_M: Final = 3.0
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def lateral_m(x: float, y: float, sin: float, cos: float, bend: float) -> float:
     """Lateral place at the rear axle (m, left positive) of the concentric line through (x, y)."""
     t, n = cos * x + sin * y, cos * y - sin * x
     square = t * t + n * n
     root = 1.0 - 2.0 * bend * n + bend * bend * square
-    return (2.0 * n - bend * square) / (1.0 + np.sqrt(max(root, 0.0)))
+    return float((2.0 * n - bend * square) / (1.0 + np.sqrt(max(root, 0.0))))
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def best_arc(ridges: FloatArray, weight: FloatArray) -> FloatArray:
     """Direction and curvature (2,) of the trial whose histogram of lateral places is the sharpest."""
     count = len(ridges)
@@ -74,7 +74,7 @@ def best_arc(ridges: FloatArray, weight: FloatArray) -> FloatArray:
     return best
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def line_places(ridges: FloatArray, weight: FloatArray, arc: FloatArray) -> FloatArray:
     """Lateral places (K,) of the lines, by weight: peaks of the histogram that lie apart."""
     bins = int(2.0 * SIDE_M / BIN_M) + 1
@@ -105,7 +105,7 @@ def line_places(ridges: FloatArray, weight: FloatArray, arc: FloatArray) -> Floa
     return places[:found]
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def fit_arc(
     ridges: FloatArray, trust: FloatArray, start: FloatArray, places: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -175,7 +175,7 @@ def fit_arc(
     return arc, covariance, places, about, owner
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def _invert(matrix: FloatArray, inverse: FloatArray) -> None:
     """Inverse of a symmetric positive definite (3, 3) matrix."""
     for i in range(3):
@@ -187,7 +187,7 @@ def _invert(matrix: FloatArray, inverse: FloatArray) -> None:
     inverse /= determinant
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def _steady(arc: FloatArray, covariance: FloatArray, places: FloatArray, about: FloatArray) -> None:
     """Take curvature as steady as the ridges allow: most roads are straight, or bend evenly, for as far as one sees.
 

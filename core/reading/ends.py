@@ -24,7 +24,7 @@ ROW_SIGMA, PLACE_SIGMA_M = 0.2, 0.04  # error of the distance, as a share of the
 LEAST_LEVELS: Final = 12.0  # contrast of paint below which nothing across the road is told
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def strip_levels(
     grey: Float32Array, x_m: Float32Array, y_m: Float32Array, arc: FloatArray, middle_m: float, width_m: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -48,7 +48,7 @@ def strip_levels(
     return levels, along
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def stop_line(
     levels: FloatArray, along_m: FloatArray, forward_m: float, paint_levels: float, depth_m: float
 ) -> tuple[float, float]:
@@ -81,7 +81,7 @@ def stop_line(
     return nothing
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def _bar(
     levels: FloatArray, along_m: FloatArray, forward_m: float, first: int, last: int, before: float, paint_levels: float
 ) -> tuple[float, float]:
@@ -101,13 +101,13 @@ def _bar(
     if peak < FULL * min(total, 1.0):
         return np.nan, np.inf
     centre /= total
-    near_m, far_m = _between(along_m, forward_m, centre - 0.5 * total), _between(along_m, forward_m, centre + 0.5 * total)
+    near_m, far_m = row_distance(along_m, forward_m, centre - 0.5 * total), row_distance(along_m, forward_m, centre + 0.5 * total)
     return 2.0 / (1.0 / near_m + 1.0 / far_m) + forward_m, far_m - near_m
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
-def _between(along_m: FloatArray, forward_m: float, row: float) -> float:
+@numba.njit(cache=True)
+def row_distance(along_m: FloatArray, forward_m: float, row: float) -> float:
     """Distance ahead of the camera at a place between two rows: its inverse grows evenly."""
     whole = min(max(int(row), 0), len(along_m) - 2)
     share = row - whole
-    return 1.0 / ((1.0 - share) / (along_m[whole] - forward_m) + share / (along_m[whole + 1] - forward_m))
+    return float(1.0 / ((1.0 - share) / (along_m[whole] - forward_m) + share / (along_m[whole + 1] - forward_m)))

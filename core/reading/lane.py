@@ -25,6 +25,8 @@ ENOUGH: Final = 25.0  # ridges that a border needs to be one; more do not make i
 USUAL: Final = 4.0  # ridges that a lane of the expected width is worth
 WIDTH_ERROR_M: Final = 0.07  # of a width as it is measured
 ALONE: Final = 1.0  # log odds against a lane with the road's edge on both sides
+PLACE_SIGMA_M, BEND_SIGMA_M2 = 0.01, 1.2  # error of the place in metres, and per curvature: lanes are drawn in straight pieces
+HEADING_SIGMA_RAD, BEND_SIGMA_M = 0.007, 0.8  # the same of the direction
 TOLD_M: Final = 4.5  # after so many metres all that is beside the axle has been ahead of the camera
 ALONG_RAD: Final = 0.2  # a lane in which the vehicle is heads no more aside than this
 BESIDE_M: Final = 0.4  # from the axle along the lane to a piece of its border that lies beside it
@@ -92,6 +94,7 @@ def place_in_lane(
     variance = GRADE**2 * (
         float(gradient @ lines.covariance @ gradient) + share**2 * sum(1.0 / float(lines.about[k, 0]) for k, _ in sides)
     )
+    variance += PLACE_SIGMA_M**2 + (BEND_SIGMA_M2 * float(lines.arc[1])) ** 2
     if len(sides) == 1:
         side = sides[0][1]
         edge = 1.0 / (1.0 + math.exp(-odds[sides[0]]))
@@ -105,6 +108,12 @@ def place_in_lane(
         middle, width = 0.5 * (painted[0] + painted[1]) + shift, painted[0] - painted[1] + widening
         variance += shift_variance
     return Place(middle, variance, width, chosen[0], chosen[1], {side: odds[k, side] for k, side in sides})
+
+
+def heading_variance_rad2(lines: Lines) -> float:
+    """Variance of the direction of the lane where the rear axle is."""
+    own = GRADE**2 * float(lines.covariance[0, 0])
+    return own + HEADING_SIGMA_RAD**2 + (BEND_SIGMA_M * float(lines.arc[1])) ** 2
 
 
 def _borders(

@@ -15,6 +15,8 @@ AHEAD_M: Final = 9.0  # nothing farther than this gets out of sight from one fra
 MOST: Final = 240  # ridges kept
 DRIFT: Final = 0.04  # growth of the error per metre moved, as metres per pixel of a ridge: 1.2 cm
 TOLD_M: Final = 6.0  # over which the belief in what a line was taken for fades
+SAME_M: Final = 1.2  # by which a mouth seems to move at most from one frame to the next
+PASSED_M: Final = 2.0  # behind a mouth, the ends of other lines are not yet those of the next lane
 EMPTY: Final = np.zeros((0, 5))
 
 
@@ -24,13 +26,14 @@ class Memory:
     def __init__(self) -> None:
         self.ridges: FloatArray = EMPTY  # (M, 5) as ``find_ridges`` gives them, of row -1
         self.trust: FloatArray = np.zeros(0)  # (M,)
+        self.mouth_m = math.nan  # distance ahead of the rear axle of the mouth that was told last
         self.told_m = 0.0  # how far the vehicle has come while its way was told
         self.edges: dict[int, float] = {}  # side (1 left, -1 right) -> log odds that the border is the road's edge
 
     def forget(self) -> None:
         """As if nothing had been seen."""
         self.ridges, self.trust, self.edges = EMPTY, np.zeros(0), {}
-        self.told_m = 0.0
+        self.told_m, self.mouth_m = 0.0, math.nan
 
     def move(self, moved_m: float, turned_rad: float) -> None:
         """Into the axes of the vehicle after a step; one that is not known makes all forgotten."""
@@ -38,6 +41,7 @@ class Memory:
             self.forget()
             return
         self.told_m += abs(moved_m)
+        self.mouth_m = self.mouth_m - moved_m if self.mouth_m - moved_m > -PASSED_M else math.nan
         fades = math.exp(-abs(moved_m) / TOLD_M)
         self.edges = {side: fades * odds for side, odds in self.edges.items()}
         cos, sin = math.cos(turned_rad), math.sin(turned_rad)
@@ -56,6 +60,13 @@ class Memory:
         scale = (x - forward_m) / (nearest - forward_m)
         seen = (x > nearest) & (y < scale * ground.y_m[0, 0]) & (y > scale * ground.y_m[0, -1])
         self.ridges, self.trust = self.ridges[~seen], self.trust[~seen]
+
+    def is_next(self, mouth_m: float) -> bool:
+        """Whether a mouth is the one that was told before, or there is none such; it is remembered."""
+        if mouth_m > self.mouth_m + SAME_M:
+            return False
+        self.mouth_m = mouth_m
+        return True
 
     def keep(self, ridges: FloatArray, trust: FloatArray) -> None:
         """Remember the ridges (N, 5) of the lane's borders, those seen before among them."""

@@ -12,8 +12,9 @@ from hippodrome.core.reading.arcs import GRADE, best_arc, fit_arc, line_places
 from hippodrome.core.reading.config import ReaderConfig
 from hippodrome.core.reading.ends import stop_line, strip_levels
 from hippodrome.core.reading.ground import Ground, ground_of
-from hippodrome.core.reading.lane import Lines, Place, beside_the_axle, place_in_lane
+from hippodrome.core.reading.lane import Lines, Place, beside_the_axle, heading_variance_rad2, place_in_lane
 from hippodrome.core.reading.memory import Memory
+from hippodrome.core.reading.mouth import line_end
 from hippodrome.core.reading.ridges import find_ridges, trust_of
 from hippodrome.core.reading.traits import line_traits
 from hippodrome.core.reading.types import LaneEnd, RoadReading
@@ -21,6 +22,7 @@ from hippodrome.core.types import Float32Array, Frame
 from hippodrome.core.views.egomotion.camera import RoadCamera
 
 LEAST_RIDGES: Final = 8  # fewer tell of no road
+SOLID_ODDS: Final = 2.0  # log odds that a line is the road's edge, from which on its end is told
 LEAST_ROWS: Final = 12  # frames that show the road in fewer rows are of no use
 
 
@@ -65,7 +67,7 @@ class RoadReader:
             offset_m=-place.middle_m,
             offset_variance_m2=place.variance_m2,
             heading_rad=-float(lines.arc[0]),
-            heading_variance_rad2=GRADE**2 * float(lines.covariance[0, 0]),
+            heading_variance_rad2=heading_variance_rad2(lines),
             curvature_1pm=float(lines.arc[1]),
             curvature_variance_1pm2=GRADE**2 * float(lines.covariance[1, 1]),
             lane_width_m=place.width_m,
@@ -111,6 +113,16 @@ class RoadReader:
         line = stop_line(levels, along_m, self._camera.forward_m, paint, self._config.stop_line_m)
         if line[1] < math.inf:
             return line[0], line[1], LaneEnd.STOP_LINE
+        best = math.nan, math.inf
+        for k, side in ((place.left, 1), (place.right, -1)):
+            if k >= 0 and place.edges[side] > SOLID_ODDS:
+                at = float(lines.places_m[k])
+                found = line_end(
+                    grey, ground.x_m, ground.y_m, lines.ridges, lines.owner, k, lines.arc, at, self._camera.forward_m
+                )
+                best = found if found[1] < best[1] else best
+        if best[1] < math.inf and self._memory.is_next(best[0]):
+            return best[0], best[1], LaneEnd.MOUTH
         return math.nan, math.inf, LaneEnd.NOTHING
 
     def _remember(self, lines: Lines, place: Place) -> None:

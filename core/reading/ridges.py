@@ -20,7 +20,7 @@ ASIDE_M: Final = 8.0  # lines farther aside are of no use
 PER_ROW: Final = 24  # most ridges kept of a row
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def noise_levels(grey: Float32Array) -> float:
     """Standard deviation of the noise (8-bit levels) from second differences along the rows, of which most see plain road."""
     step, count = 5, 0
@@ -30,10 +30,10 @@ def noise_levels(grey: Float32Array) -> float:
         for u in range(1 + row % step, width - 1, step):
             bent[count] = abs(grey[row, u - 1] - 2.0 * grey[row, u] + grey[row, u + 1])
             count += 1
-    return float(np.median(bent[:count])) / (0.6745 * np.sqrt(6.0))
+    return float(np.median(bent[:count]) / (0.6745 * np.sqrt(6.0)))
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def find_ridges(grey: Float32Array, x_m: Float32Array, y_m: Float32Array, line_m: float) -> FloatArray:
     """Ridges (N, 5): x, y in metres, metres per pixel, contrast in levels, number of the row; of the rows ``grey`` (R, W)."""
     count, width = grey.shape
@@ -98,4 +98,5 @@ def trust_of(ridges: FloatArray) -> FloatArray:
     """Weights (N,) up to 1: paint stands out, and what stands out much less than most of the paint in a frame may be none."""
     contrast = ridges[:, 3]
     strong = np.partition(contrast, int(0.8 * (len(contrast) - 1)))[int(0.8 * (len(contrast) - 1))]
-    return np.minimum(contrast / (0.6 * strong), 1.0) ** 2
+    trust: FloatArray = np.minimum(contrast / (0.6 * strong), 1.0) ** 2
+    return trust

@@ -15,7 +15,7 @@ LONGEST_ROW_M: Final = 1.0  # of road that a row shows: far ones show more, of w
 MARGIN_PX: Final = 2.5  # a line nearer to the frame's side is cut by it
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def y_on_line(x: float, place: float, arc: FloatArray) -> float:
     """Where the line at the lateral place ``place`` of the rear axle lies, x metres ahead of it."""
     sin, cos = np.sin(arc[0]), np.cos(arc[0])
@@ -23,10 +23,10 @@ def y_on_line(x: float, place: float, arc: FloatArray) -> float:
     for _ in range(4):
         c = place + arc[2] * (cos * x + sin * y) ** 3 / 6.0
         y = (c + 0.5 * arc[1] * (x * x + y * y - c * c) + sin * x) / cos
-    return y
+    return float(y)
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def _mean(levels: Float32Array, first: float, last: float) -> float:
     """Mean brightness between two columns; 0 where they lie mostly outside of the frame."""
     low, high = max(int(first + 0.5), 0), min(int(last + 0.5), len(levels) - 1)
@@ -38,7 +38,7 @@ def _mean(levels: Float32Array, first: float, last: float) -> float:
     return total / (high - low + 1)
 
 
-@numba.njit(cache=True)  # type: ignore[misc]  # numba is untyped
+@numba.njit(cache=True)
 def line_traits(
     grey: Float32Array,
     x_m: Float32Array,

@@ -66,8 +66,10 @@ class Circumstances:
         speed_mps: the ego's.
         other_m: x, y, heading of the middle of the other.
         other_mps: the other's speed.
-        in_own_lane: every wheel of the ego is in its lane, outside of junctions, and it was so for two seconds.
-        same_lane: the other is on the ego's lane.
+        in_own_lane: every wheel of the ego is in its lane, also through a junction.
+        keeps_lane: it was so for two seconds, or the ego stands.
+        same_lane: the other is on a lane that the ego is on, has just left, or drives along next.
+        ways_cross: the ways of the two through a junction cross or meet.
         had_to_yield: the other had to let the ego pass, and no red signal was run.
     """
 
@@ -76,7 +78,9 @@ class Circumstances:
     other_m: tuple[float, float, float]
     other_mps: float
     in_own_lane: bool
+    keeps_lane: bool
     same_lane: bool
+    ways_cross: bool
     had_to_yield: bool
 
 
@@ -85,19 +89,20 @@ def is_at_fault(c: Circumstances) -> tuple[bool, str]:
 
     It is, but for three cases. *From behind*: the other heads the same way within 60 degrees, its middle is behind the ego's, it
     is the faster one, and the ego was not changing lanes. *Had to yield*: the rights of way of the junction that both are in say
-    that the other waits, and the ego ran no red signal. *Left its lane*: the ego stands or drives within its own lane outside of
-    junctions, and the other, on another lane or more than 20 degrees askew, cuts into it.
+    that the other waits, and the ego ran no red signal. *Left its lane*: the ego is within its own lane, to 30 cm, and the other
+    moves and is on a lane that neither crosses nor meets the ego's and that the ego does not follow, as long vehicles are that
+    swing out in turns; or it stands more than 20 degrees askew in the ego's lane outside of junctions, as who cuts in.
     """
     cos, sin = math.cos(c.pose_m[2]), math.sin(c.pose_m[2])
     dx, dy = c.other_m[0] - c.pose_m[0], c.other_m[1] - c.pose_m[1]
     ahead_m = cos * dx + sin * dy - CENTRE_AHEAD_M
     turn = abs((c.other_m[2] - c.pose_m[2] + math.pi) % (2.0 * math.pi) - math.pi)
     alongside = turn < ALONGSIDE_RAD
-    steady = c.in_own_lane or c.speed_mps < STANDS_MPS or c.same_lane
-    if alongside and ahead_m < 0.0 and c.other_mps > c.speed_mps and steady:
+    if alongside and ahead_m < 0.0 and c.other_mps > c.speed_mps and (c.keeps_lane or c.same_lane):
         return False, "run into from behind"
     if c.had_to_yield:
         return False, "the other had to yield"
-    if c.in_own_lane and c.other_mps > STANDS_MPS and (not c.same_lane or turn > ASKEW_RAD):
+    cuts_in = c.keeps_lane and turn > ASKEW_RAD if c.same_lane else not c.ways_cross
+    if c.in_own_lane and c.other_mps > STANDS_MPS and cuts_in:
         return False, "the other left its lane"
     return True, "ran into another vehicle" if c.speed_mps >= STANDS_MPS else "stood in the way of another vehicle"

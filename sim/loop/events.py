@@ -16,6 +16,7 @@ TOLERANCE_M: Final = 0.05  # a tyre on the line is in the lane
 OVER_S: Final = 1.0  # what has not been seen for so long is over, and would be a new event
 WRONG_WAY_S: Final = 0.5  # against the traffic for so long, and moving
 MOVING_MPS: Final = 0.3
+SWING_M: Final = 0.3  # in turns the wheels need not be in the lane's middle
 STEADY_S: Final = 2.0  # so long the ego must have been in its lane to be there by right
 
 
@@ -85,14 +86,15 @@ class Watch:
         x, y, heading = m.users.poses_m[row, :3].tolist()
         own = [lane for lane in (truth.lane, m.front_lane) if lane in self._rights.junction_of]
         first = any(self._rights.must_yield(other, lane) and not self._rights.must_yield(lane, other) for lane in own)
-        steady = truth.t_s - self._steady_since_s >= STEADY_S and not own
-        standing = truth.speed_mps < MOVING_MPS and truth.wheel_outside_m <= TOLERANCE_M and not own
+        keeps = not own and (truth.t_s - self._steady_since_s >= STEADY_S or truth.speed_mps < MOVING_MPS)
         return Circumstances(
             pose_m=truth.pose_m,
             speed_mps=truth.speed_mps,
             other_m=(x, y, heading),
             other_mps=float(m.users.speed_mps[row]),
-            in_own_lane=truth.lane >= 0 and not m.against and (steady or standing),
-            same_lane=other == truth.lane,
+            in_own_lane=m.strip_outside_m <= SWING_M and not m.against,
+            keeps_lane=keeps,
+            same_lane=other in m.line,
+            ways_cross=any(self._rights.cross(other, lane) for lane in own),
             had_to_yield=first and not self._crossing.on_red(m.front_lane),
         )

@@ -25,6 +25,9 @@ class Footing:
         lane: that the rear axle is on, -1 off the road.
         front_lane: that the front bumper is on, -1 off the road.
         front_rest_m: from the front bumper to the end of its lane, as drawn; nan off the road.
+        front_m: where SUMO is told that the front bumper is, and its heading: in the lane's middle and along it, as long as it
+            is on the lane's strip, since SUMO goes by the nearest lane; else where it really is.
+        strip_outside_m: how far the worst wheel is outside of the strips of these two lanes, also in junctions.
         against: the middle lies on a lane that runs against the ego and on none that runs with it.
         off_road: the middle lies on nothing that is paved for cars.
     """
@@ -35,20 +38,32 @@ class Footing:
     offset_m: float
     heading_error_rad: float
     front_rest_m: float
+    front_m: tuple[float, float, float]
     wheel_outside_m: float
     off_paving_m: float
+    strip_outside_m: float
     in_junction: bool
     against: bool
     off_road: bool
 
 
-def stand(ground: Ground, pose_m: tuple[float, float, float], lane: int, front_lane: int) -> Footing:
-    """Looks up the ego's points; ``lane`` and ``front_lane`` are those of the step before, -1 if there are none."""
+def stand(ground: Ground, pose_m: tuple[float, float, float], lane: int, front_lane: int, expected: int = -1) -> Footing:
+    """Looks up the ego's points.
+
+    Args:
+        ground: of the town.
+        pose_m: of the rear axle.
+        lane: that the rear axle was on in the step before, -1 if none.
+        front_lane: the same of the front bumper.
+        expected: the first lane inside the junction ahead on the way that the indicator means, -1 if none.
+    """
     heading, network = pose_m[2], ground.network
     wheels = wheels_m(pose_m)
     middle = ahead_of(pose_m, CENTRE_AHEAD_M)
     near = ground.near(np.array([pose_m[:2], ahead_of(pose_m, REAR_AXLE_TO_FRONT_M), *wheels, middle]))
-    rear, front = (ground.lane_of(near, point, heading, before) for point, before in ((REAR, lane), (FRONT, front_lane)))
+    rear, front = (
+        ground.lane_of(near, point, heading, before, expected) for point, before in ((REAR, lane), (FRONT, front_lane))
+    )
     beyond = np.maximum(near.distance_m - 0.5 * network.width_m[near.lane], 0.0)
     inside = rear >= 0 and bool(network.is_internal[near.lane[rear]])
     off = beyond.min(axis=1, initial=FAR_OFF_M)
@@ -65,11 +80,11 @@ def stand(ground: Ground, pose_m: tuple[float, float, float], lane: int, front_l
         position_m=float(near.position_m[REAR, rear]) if rear >= 0 else math.nan,
         offset_m=float(near.offset_m[REAR, rear]) if rear >= 0 else math.nan,
         heading_error_rad=_wrapped(heading - float(near.heading_rad[REAR, rear])) if rear >= 0 else math.nan,
-        front_rest_m=ground.lane_length_m(int(near.lane[front])) - float(near.position_m[FRONT, front])
-        if front >= 0
-        else math.nan,
+        front_rest_m=_rest_m(ground, near, front),
+        front_m=_front_m(ground, near, front, pose_m),
         wheel_outside_m=float(aside.max()),
         off_paving_m=float(off[WHEELS].max()),
+        strip_outside_m=float(beyond[WHEELS][:, [rear, front]].min(axis=1).max()) if rear >= 0 and front >= 0 else FAR_OFF_M,
         in_junction=inside,
         against=_runs_against(ground, near, heading),
         off_road=bool(off[MIDDLE] > 0.0),
@@ -82,6 +97,18 @@ def _runs_against(ground: Ground, near: Near, heading_rad: float) -> bool:
     turn = np.abs((near.heading_rad[MIDDLE] - heading_rad + np.pi) % (2.0 * np.pi) - np.pi)
     against = turn > AGAINST_RAD
     return bool((there & against & ~ground.network.is_internal[near.lane]).any() and not (there & ~against).any())
+
+
+def _rest_m(ground: Ground, near: Near, front: int) -> float:
+    """From the front bumper to the end of its lane, which is in column ``front``; nan off the road."""
+    return ground.lane_length_m(int(near.lane[front])) - float(near.position_m[FRONT, front]) if front >= 0 else math.nan
+
+
+def _front_m(ground: Ground, near: Near, front: int, pose_m: tuple[float, float, float]) -> tuple[float, float, float]:
+    """The front bumper as SUMO is told."""
+    if front >= 0 and near.distance_m[FRONT, front] <= 0.5 * ground.network.width_m[near.lane[front]]:
+        return ground.pose_at(int(near.lane[front]), float(near.position_m[FRONT, front]))
+    return (*ahead_of(pose_m, REAR_AXLE_TO_FRONT_M), pose_m[2])
 
 
 def _wrapped(angle_rad: float) -> float:

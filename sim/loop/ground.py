@@ -113,7 +113,7 @@ class Ground:
             beyond=(first & (past < -1e-6)) | (last & (past > 1e-6)),
         )
 
-    def lane_of(self, near: Near, point: int, heading_rad: float, previous: int) -> int:
+    def lane_of(self, near: Near, point: int, heading_rad: float, previous: int, expected: int = -1) -> int:
         """Column of ``near`` with the lane that a vehicle is on, -1 if none.
 
         The lane is the one whose centreline is nearest, counting the heading against it; those that cannot be reached from the
@@ -124,12 +124,15 @@ class Ground:
             point: which of those points.
             heading_rad: of the vehicle.
             previous: the lane at the step before, -1 if none.
+            expected: where ways part, the lane that the indicator means, -1 if none.
         """
         cost = near.distance_m[point] + BEYOND_COST_M * near.beyond[point]
         turn = np.abs((near.heading_rad[point] - heading_rad + np.pi) % (2.0 * np.pi) - np.pi)
         cost = cost + HEADING_COST_M * turn
         if previous >= 0:
             cost = cost + STRANGE_COST_M * ~np.isin(near.lane, self.kin(previous)) + CHANGE_COST_M * (near.lane != previous)
+        if expected >= 0 and near.lane.size and expected in near.lane:
+            cost = cost + CHANGE_COST_M * (self.network.is_internal[near.lane] & (near.lane != expected))
         cost = np.where(near.distance_m[point] <= self._half_width_m[near.lane] + ASIDE_M, cost, np.inf)
         if len(cost) == 0 or not np.isfinite(cost).any():
             return -1
@@ -144,6 +147,13 @@ class Ground:
             own = [lane, *after, *further, *self.network.adjacent_lanes(lane), *siblings]
             self._kin[lane] = np.unique(np.array(own, dtype=np.int64))
         return self._kin[lane]
+
+    def line(self, *lanes: int) -> frozenset[int]:
+        """Lanes, and those up to two hops after them: what whoever is on them drives along next; -1 stands for no lane."""
+        own = {lane for lane in lanes if lane >= 0}
+        for _ in range(2):
+            own |= {int(after) for lane in own for after in self.network.successors(lane)}
+        return frozenset(own)
 
     def before(self, lane: int) -> list[int]:
         """The lanes that lead into ``lane``."""

@@ -20,6 +20,8 @@ class Moment:
         user_lanes: the lanes (k,) they are on, -1 where unknown.
         front_lane: the lane that the front bumper is on, -1 off the road.
         against: the ego's middle lies on a lane that runs against it, and on none that runs with it.
+        line: lanes that the ego is on, has just left, or drives along next.
+        strip_outside_m: how far the worst wheel is outside of the strips of the ego's lanes, also in junctions.
         off_road: the ego's middle lies neither on a lane nor in a junction nor on a turning place.
         signals: SUMO's letter of the lamp of each first lane inside the junction ahead, as it was before this step and is now.
         coming: vehicles on their way into the junction ahead.
@@ -32,6 +34,8 @@ class Moment:
     user_lanes: Sequence[int]
     front_lane: int
     against: bool
+    line: frozenset[int]
+    strip_outside_m: float
     off_road: bool
     signals: dict[int, tuple[str, str]]
     coming: Sequence[Comer]

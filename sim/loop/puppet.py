@@ -9,8 +9,6 @@ import libsumo
 
 from hippodrome.core.navigation.types import Indicator
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M
-from hippodrome.sim.loop.car import ahead_of
 from hippodrome.sim.loop.ways import Way, Ways
 from hippodrome.sim.sumo_run import EGO
 
@@ -26,14 +24,15 @@ class Puppet:
         self._route: tuple[str, ...] = ()
         self._routes = 0
         self.put_back = 0  # how often SUMO had taken the ego off the road
+        self.misplaced = 0  # steps after which SUMO had the ego on another lane than told: others may not have seen it
 
     def place(
-        self, pose_m: tuple[float, float, float], speed_mps: float, lane: int, before: int, indicator: Indicator
+        self, front_m: tuple[float, float, float], speed_mps: float, lane: int, before: int, indicator: Indicator
     ) -> Way | None:
         """Puts the ego where it is.
 
         Args:
-            pose_m: of the rear axle.
+            front_m: of the front bumper.
             speed_mps: what others believe.
             lane: that the front bumper is on, -1 off the road.
             before: the last lane outside of junctions that it was on.
@@ -47,13 +46,17 @@ class Puppet:
             self._insert(route)
         elif route and route != self._route:
             self._reroute(route)
-        x, y = ahead_of(pose_m, REAR_AXLE_TO_FRONT_M)
+        x, y, heading = front_m
         edge, _, number = self._network.lane_ids[lane].rpartition("_") if lane >= 0 else ("", "", "-1")
-        angle = 90.0 - math.degrees(pose_m[2])
+        angle = 90.0 - math.degrees(heading)
         libsumo.vehicle.moveToXY(EGO, edge, int(number), x, y, angle, KEEP_ROUTE)
         libsumo.vehicle.setSpeed(EGO, speed_mps)
         libsumo.vehicle.setSignals(EGO, SIGNALS[indicator])
         return way
+
+    def check(self, lane: int) -> None:
+        """After SUMO's step: is the ego on the lane that it was put on."""
+        self.misplaced += lane >= 0 and libsumo.vehicle.getLaneID(EGO) != self._network.lane_ids[lane]
 
     def _plan(self, lane: int, before: int, indicator: Indicator) -> tuple[Way | None, tuple[str, ...]]:
         """The way ahead, and the edges that SUMO is told."""

@@ -6,7 +6,7 @@ import math
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self
+from typing import ClassVar, Final, Self
 
 import libsumo
 import numpy as np
@@ -25,6 +25,7 @@ from hippodrome.sim.loop.puppet import Puppet
 from hippodrome.sim.loop.radar import measured, nearest_ahead
 from hippodrome.sim.loop.rights import Rights
 from hippodrome.sim.loop.sight import Sight
+from hippodrome.sim.loop.top_view import TopView
 from hippodrome.sim.loop.types import EventKind, LanePlace, Sensed, Truth
 from hippodrome.sim.loop.users import Onlooker
 from hippodrome.sim.loop.walls import Walls
@@ -45,16 +46,18 @@ ENDS_M: Final = 3.0  # a drawn start keeps this far from its lane's ends
 
 
 class World:
-    """A scenario's town with its traffic, in which somebody drives the ego. One at a time per process, as SUMO and GL want it.
+    """A scenario's town with its traffic, in which somebody drives the ego.
 
-    The localization drive of the scenario says traffic, light and weather. The same seed and the same commands give the same
-    bytes.
+    SUMO and GL are one per process: a world that is reset takes them from another one. The localization drive of the scenario
+    says traffic, light and weather. The same seed and the same commands give the same bytes.
 
     Args:
         scenario: what to build; its camera, noise and localization drive count.
         root: folder below which generated towns are kept.
         draw: whether frames are drawn; without them observations have none, no GL is needed and a step costs a third.
     """
+
+    _live: ClassVar[World | None] = None  # SUMO and GL are one per process: whoever is reset takes them
 
     def __init__(self, scenario: Scenario, root: Path, draw: bool = True) -> None:
         self.scenario = scenario
@@ -77,6 +80,11 @@ class World:
         """How often SUMO had taken the ego off the road since the reset; it was put back at once."""
         return self._puppet.put_back
 
+    @property
+    def misplaced(self) -> int:
+        """Steps since the reset after which SUMO had the ego on another lane than it is on: others may not have seen it."""
+        return self._puppet.misplaced
+
     def __enter__(self) -> Self:
         return self
 
@@ -85,18 +93,24 @@ class World:
 
     def close(self) -> None:
         """Ends SUMO and frees the renderer; a second call does nothing."""
+        self._end()
+        self._sight.close()
+        if World._live is self:
+            World._live = None
+
+    def _end(self) -> None:
         if self._sumo is not None:
             self._sumo.close()
             self._sumo = None
-        self._sight.close()
 
     def reset(self, seed: int, start: LanePlace | None = None) -> Sensed:
         """Begins anew: fresh traffic, the ego standing at ``start``, or at a place drawn by the seed.
 
         Raises HippodromeError where the place is not on the network, or SUMO fails.
         """
-        if self._sumo is not None:
-            self._sumo.close()
+        if World._live is not None:
+            World._live.close() if World._live is not self else self._end()
+        World._live = self
         rng_traffic, rng_start, self._rng_odometry, self._rng_radar = (np.random.default_rng([seed, k]) for k in range(4))
         self._seed, ego = seed, self._drive.ego
         lane, position_m = self._start(start, rng_start)
@@ -133,7 +147,9 @@ class World:
             HippodromeError: a command is not a finite number, there was no reset, or SUMO fails.
         """
         if self._sumo is None:
-            raise HippodromeError("world: step() before reset(), or after close(); call reset(seed) first")
+            raise HippodromeError(
+                "world: step() before reset(), or after close() or the reset of another world; call reset(seed)"
+            )
         if not (math.isfinite(acceleration_mps2) and math.isfinite(steering_rad)):
             raise HippodromeError(
                 f"world: command ({acceleration_mps2}, {steering_rad}) at {self._steps * STEP_S:.1f} s is not two finite numbers"
@@ -189,15 +205,16 @@ class World:
     def _move(self) -> None:
         """Finds the ego's lanes, tells SUMO, lets SUMO step, and looks round."""
         pose, signals = self._car.pose_m, self._signals
-        self._footing = stand(self.ground, pose, self._lane, self._front_lane)
+        self._footing = stand(self.ground, pose, self._lane, self._front_lane, self._expected())
         self._lane, self._front_lane = self._footing.lane, self._footing.front_lane
         last = self._before
         if self._front_lane >= 0 and not self.network.is_internal[self._front_lane]:
             self._before = self._front_lane
         speed, put_back = self._car.speed_mps, self.put_back
         try:
-            self._puppet.place(pose, speed, self._front_lane, self._before, self._indicator)
+            self._puppet.place(self._footing.front_m, speed, self._front_lane, self._before, self._indicator)
             libsumo.simulationStep()
+            self._puppet.check(self._front_lane)
             self._users = self._onlooker.near(*pose[:2])
             self._ahead = self._lookout.look(self._footing, self._before, self._indicator, speed, self._users, pose[:2])
             user_lanes = self._lookout.lanes_of(self._users)
@@ -211,6 +228,8 @@ class World:
             user_lanes=user_lanes,
             front_lane=self._front_lane,
             against=self._footing.against,
+            line=self.ground.line(self._lane, self._front_lane, self._before),
+            strip_outside_m=self._footing.strip_outside_m,
             off_road=self._footing.off_road,
             signals={lane: (signals[lane], now[lane]) for lane in now if lane in signals} if last == self._before else {},
             coming=self._ahead.coming,
@@ -232,6 +251,17 @@ class World:
             frame = self._sight.frame(seen_from, self._users, np.random.default_rng([self._seed, self._steps]))
         observation = Observation(truth.t_s, STEP_S, speed, yaw_rate, frame)
         return Sensed(observation, radar, truth, self._events, self._users.poses_m)
+
+    def picture(self, view: TopView) -> Frame:
+        """The town from above, as it is now."""
+        return view.draw(self._car.pose_m, self._users.poses_m, self._users.sizes_m)
+
+    def _expected(self) -> int:
+        """The first lane inside the junction ahead that the indicator means; in the junction, the one that the front is on."""
+        if self._front_lane >= 0 and self.network.is_internal[self._front_lane]:
+            return self._front_lane
+        way = self.ways.meant(self._before, self._indicator) if self._before >= 0 else None
+        return way.inside[0] if way is not None and way.inside else -1
 
     def _look_down(self) -> Truth:
         pose, car, footing = self._car.pose_m, self._car, self._footing

@@ -28,7 +28,7 @@ def scenario(vehicles=0, noise="paper", town=None, **other):
 def keeper(world, sensed, indicator=Indicator.STRAIGHT, speed_mps=6.0, gap_m=3.0):
     """A command that keeps the lane's middle by pure pursuit of the truth, and stands behind whoever is ahead."""
     truth, ground = sensed.truth, world.ground
-    reach_m, lane = truth.lane_position_m + 4.0 + 0.5 * truth.speed_mps, truth.lane
+    reach_m, lane = truth.lane_position_m + 2.5 + 0.4 * truth.speed_mps, truth.lane
     while lane >= 0 and reach_m > ground.lane_length_m(lane):
         reach_m -= ground.lane_length_m(lane)
         lane = next_lane(world, lane, indicator)

@@ -55,6 +55,7 @@ LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehi
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 CREEP_AFTER_S = 4.0  # stood without a road ahead and with nobody there, one creeps on
+ROUND_M = 250.0  # searched round one block, then straight on to the next ones, and so in turn
 ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
 
 
@@ -107,6 +108,7 @@ class Navigator:
         self._since_look_s = self._apart_s = self._standing_s = self._at_goal_s = self._search_stood_s = 0.0
         self._since_fix_m, self._unfixed_m = 0.0, 0.0
         self._misfits = self._off_road = 0
+        self._searched_m = 0.0
         self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
         self._refuted_m = 0.0
         self._arrived = False
@@ -307,10 +309,12 @@ class Navigator:
     def _searching(self, radar: Radar, dt_s: float) -> Command:
         """On sight along the border."""
         config, speed = self._config, self._motion.speed_mps
+        self._searched_m += speed * dt_s
         self._search_stood_s = self._search_stood_s + dt_s if speed < 2.0 * config.drive.creep_mps else 0.0
         bend = math.tan(self._motion.steering_rad) / config.vehicle.wheelbase_m
+        straight_on = int(self._searched_m / ROUND_M) % 2 == 1
         step = search_step(
-            self._ground, self._memory, self._reading, radar, self._side, speed, bend, config.drive, config.vehicle
+            self._ground, self._memory, self._reading, radar, self._side, speed, bend, straight_on, config.drive, config.vehicle
         )
         accel = min(
             approach_mps2(speed, step.speed_mps, config.drive), following_mps2(speed, radar, config.drive, config.vehicle)

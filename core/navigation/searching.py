@@ -96,11 +96,11 @@ class SearchStep:
 
 
 def search_step(
-    ground: Ground, memory: LaneMemory, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float, bend_1pm: float,
+    ground: Ground, memory: LaneMemory, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float, bend_1pm: float, straight_on: bool,
     config: DriveConfig, vehicle: VehicleShape,
 ) -> SearchStep:  # fmt: skip
     """The next step along the border on the own ``side``: -1 right, +1 left; ``bend_1pm`` is what the vehicle drives now."""
-    way = ground.way(bend_1pm, side, KERB_M, LOOK_M)
+    way = ground.way(bend_1pm, side, KERB_M, straight_on, LOOK_M)
     bends, turned = way.curvature_1pm, way.heading_rad - way.heading_rad[0]
     near = min(int(PREVIEW_S * speed_mps / STEP_M), len(bends) - 1)
     curvature = float(bends[near])

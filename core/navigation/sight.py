@@ -43,6 +43,7 @@ STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie s
 UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
 OTHER_SIDE_1PM = 0.12  # and more so where the other side of the road is nearest
 MOST_TURN_RAD = 1.9
+RECEDES_RAD, STRAIGHT_ON_M = 0.25, 0.2  # a border that leads away by so much is a side street's, for who goes straight on
 LEAST_ROOM_M = 0.5  # nearer to what is no road no wheel has room
 DECAY_M = 2.6  # distance over which an offset from the way fades
 TIGHTEST_1PM = 0.29  # a little less than the turning circle
@@ -133,8 +134,11 @@ class Ground:
         near = view.ahead_m < reach
         _enter(self._cells, self._origin_m, self.pose, view.ahead_m[near], view.left_m[near], kind[near])
 
-    def way(self, bend_1pm: float, side: float, beside_m: float, length_m: float) -> Way:
-        """The way that keeps ``beside_m`` from what is no road on one side: +1 left, -1 right; it begins with a curvature."""
+    def way(self, bend_1pm: float, side: float, beside_m: float, straight_on: bool, length_m: float) -> Way:
+        """The way that keeps ``beside_m`` from what is no road on one side: +1 left, -1 right; it begins with a curvature.
+
+        With ``straight_on`` it passes side streets on that side, and where the road ends it turns to the other side.
+        """
         middle = ((self.pose[:2] - self._origin_m) / CELL_M).astype(np.int64)
         low = np.clip(middle - AROUND, 0, CELLS - 2 * AROUND)
         part = self._cells[low[0] : low[0] + 2 * AROUND, low[1] : low[1] + 2 * AROUND]
@@ -142,7 +146,7 @@ class Ground:
         other = cv2.morphologyEx(cv2.morphologyEx(other, cv2.MORPH_OPEN, SPECK), cv2.MORPH_CLOSE, STRIPES)
         field = CELL_M * cv2.distanceTransform(1 - other, cv2.DIST_L2, 5).astype(np.float64)
         corner_m = self._origin_m + CELL_M * low
-        rows = _along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, int(length_m / STEP_M))
+        rows = _along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
         blocked = np.flatnonzero(rows[:, 3] < LEAST_ROOM_M)
         free_m = STEP_M * float(blocked[0] if len(blocked) else len(rows))
         return Way(rows[:, 0], rows[:, 1], rows[:, 2], free_m)
@@ -243,7 +247,7 @@ def _distance_at(field: FloatArray, corner: FloatArray, x: float, y: float) -> f
 
 @njit(cache=True)
 def _along_border(
-    field: FloatArray, corner: FloatArray, pose: FloatArray, bend: float, side: float, beside_m: float, count: int
+    field: FloatArray, corner: FloatArray, pose: FloatArray, bend: float, side: float, beside_m: float, straight_on: bool, count: int
 ) -> FloatArray:
     """The way: rows (count, 4) of curvature, heading, whether the border was seen, and the distance to what is no road.
 
@@ -259,12 +263,14 @@ def _along_border(
         gx = _distance_at(field, corner, px + SLOPE_M, py) - _distance_at(field, corner, px - SLOPE_M, py)
         gy = _distance_at(field, corner, px, py + SLOPE_M) - _distance_at(field, corner, px, py - SLOPE_M)
         seen = d < REACH_M and gx * gx + gy * gy > 1e-6
-        wanted = side * UNSEEN_1PM
+        wanted = 0.0 if straight_on else side * UNSEEN_1PM
         if seen:
             along = math.atan2(gy, gx) + side * 0.5 * math.pi  # the border's direction, with the border on the own side
             turn = (heading - along + math.pi) % (2.0 * math.pi) - math.pi
             off = side * (beside_m - min(d, beside_m + 1.0))  # of the vehicle to the left of its line
-            if abs(turn) < MOST_TURN_RAD:
+            if straight_on and side * turn < -RECEDES_RAD and d > beside_m - STRAIGHT_ON_M:
+                wanted = 0.0  # the border leads into a side street
+            elif abs(turn) < MOST_TURN_RAD:
                 wanted = -off / DECAY_M**2 - 2.0 * turn / DECAY_M
             else:  # what is nearest is the border of the other side
                 wanted = side * OTHER_SIDE_1PM

@@ -47,11 +47,11 @@ class DriveConfig:
     search_mps: float = 5.0  # without a fix
     doubt_mps: float = 4.0  # while the place is doubted
     unsure_m: float = 1.2  # standard deviation of the position from which on the vehicle slows down
-    yaw_rate_radps: float = 0.7  # tight turns are driven slowly enough to steer through them
+    yaw_rate_radps: float = 0.5  # tight turns are driven slowly enough to turn the wheels in time
     creep_mps: float = 1.2
     error_decay_m: float = 3.0  # distance over which an offset from the path fades at low speed
     error_decay_s: float = 0.6  # and the time it takes at least
-    preview_s: float = 0.2  # steering looks ahead by about its own delay
+    preview_s: float = 0.3  # steering looks ahead by about its own delay
     speed_gain_1ps: float = 1.5
     headway_s: float = 1.4  # of the intelligent driver model (Treiber, Hennecke and Helbing, 2000)
     jam_gap_m: float = 2.5  # and its gap at rest

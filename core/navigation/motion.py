@@ -13,7 +13,8 @@ from hippodrome.core.navigation.config import VehicleShape
 from hippodrome.core.types import Observation
 
 PRIOR_SIGMA = 0.28  # of ln(scale): two drives differ by a fifth each
-VISUAL_SIGMA, VISUAL_M = 0.06, 12.0  # what visual odometry tells, once it has seen so many metres
+VISUAL_SIGMA, VISUAL_M = 0.12, 12.0  # what visual odometry tells, once it has seen so many metres
+BELIEVED = 1.6  # a speed of visual odometry that differs by a larger factor from what is expected is a dash taken for another one
 TOLD_SIGMA, TOLD_PER_M = (
     0.03,
     0.02,
@@ -61,7 +62,7 @@ def sensed(
     smooth = speed if speed == 0.0 else motion.speed_mps + SPEED_TRUST * (speed - motion.speed_mps)
     bend = math.tan(motion.steering_rad) / vehicle.wheelbase_m
     seen_m, seen_units = MEMORY * motion.seen_m, MEMORY * motion.seen_units
-    if seen_mps is not None and observation.speed > 0.0:
+    if seen_mps is not None and speed > 0.0 and 1.0 / BELIEVED < seen_mps / speed < BELIEVED:
         seen_m, seen_units = seen_m + max(seen_mps, 0.0) * dt_s, seen_units + units
     turned, turning, turned_rad = motion.turned, motion.turning, motion.turned_rad
     if abs(bend) > LEAST_BEND_1PM and units > 0.0:

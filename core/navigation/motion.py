@@ -1,7 +1,7 @@
 """How fast the vehicle is, in metres per second, though its odometry counts in units of unknown length.
 
-Before views tell the scale, three things do: what is expected of it, the frames (visual odometry knows the height of the camera), and
-the vehicle itself: in a steered turn the yaw rate is v tan(delta) / L (the single-track model), and the gyro measures it in radians.
+Before views tell the scale, three things do: what is expected of it, the dashes that pass (``dashes``), and the vehicle
+itself: in a steered turn the yaw rate is v tan(delta) / L (the single-track model), and the gyro measures it in radians.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from hippodrome.core.navigation.config import VehicleShape
 from hippodrome.core.types import Observation
 
 PRIOR_SIGMA = 0.28  # of ln(scale): two drives differ by a fifth each
-VISUAL_SIGMA, VISUAL_M = 0.12, 12.0  # what visual odometry tells, once it has seen so many metres
-BELIEVED = 1.6  # a speed of visual odometry that differs by a larger factor from what is expected is a dash taken for another one
+VISUAL_SIGMA, VISUAL_M = 0.05, 6.0  # what passing dashes tell, once they have been seen over so many metres
 TOLD_SIGMA, TOLD_PER_M = (
     0.03,
     0.02,
 )  # what the localizer tells, and how fast it is followed: one wrong view moves its scale by a tenth
 STEERED_SIGMA, STEERED_RAD = 0.04, 0.4  # what turns tell, once the vehicle has turned so much
 LEAST_BEND_1PM = 0.03  # straighter driving tells nothing of the scale
+SEEN_MEMORY = 0.97  # of the sums of what was seen, per look
 MEMORY = 0.997  # of the sums, per step of a tenth of a second: the scale wanders over some hundred metres
 WHEEL_RATE_RADPS = 0.9  # how fast the road wheels can be turned
 SPEED_TRUST = 0.25  # weight of one speed measurement: its noise is 6 % at 10 Hz
@@ -32,7 +32,7 @@ class Motion:
 
     speed_mps: float = 0.0
     steering_rad: float = 0.0  # where the road wheels stand, as they were told to
-    seen_m: float = 0.0  # sums over the drive: metres by visual odometry, and units by the odometry meanwhile
+    seen_m: float = 0.0  # sums over the drive: metres seen to pass, and units by the odometry meanwhile
     seen_units: float = 0.0
     turned: float = 0.0  # sum of yaw rate times what a unit turns: numerator of the least-squares scale
     turning: float = 0.0  # sum of the squares of the latter
@@ -40,9 +40,9 @@ class Motion:
     told: float = math.nan  # ln(scale) as the localizer tells it, smoothed; nan until it does
 
     def metres_per_unit(self, expected: float) -> float:
-        """The scale: a mean of ln(scale) by what is expected, frames and turns, each with its weight."""
+        """The scale: a mean of ln(scale) by what is expected, dashes and turns, each with its weight."""
         total, weight = math.log(expected) / PRIOR_SIGMA**2, 1.0 / PRIOR_SIGMA**2
-        if self.seen_m > 1.0 and self.seen_units > 0.0:
+        if self.seen_m > 0.5 and self.seen_units > 0.0:
             trust = min(self.seen_m / VISUAL_M, 1.0) / VISUAL_SIGMA**2
             total, weight = total + trust * math.log(self.seen_m / self.seen_units), weight + trust
         if self.turned > 0.0 and self.turning > 0.0:
@@ -53,23 +53,25 @@ class Motion:
         return math.exp(total / weight)
 
 
-def sensed(
-    motion: Motion, observation: Observation, seen_mps: float | None, metres_per_unit: float, vehicle: VehicleShape
-) -> Motion:
-    """The motion after an observation; ``seen_mps`` is the speed by visual odometry, where that runs."""
+def sensed(motion: Motion, observation: Observation, metres_per_unit: float, vehicle: VehicleShape) -> Motion:
+    """The motion after an observation."""
     dt_s, units = observation.dt_s, observation.speed * observation.dt_s
     speed = metres_per_unit * observation.speed
     smooth = speed if speed == 0.0 else motion.speed_mps + SPEED_TRUST * (speed - motion.speed_mps)
     bend = math.tan(motion.steering_rad) / vehicle.wheelbase_m
-    seen_m, seen_units = MEMORY * motion.seen_m, MEMORY * motion.seen_units
-    if seen_mps is not None and speed > 0.0 and 1.0 / BELIEVED < seen_mps / speed < BELIEVED:
-        seen_m, seen_units = seen_m + max(seen_mps, 0.0) * dt_s, seen_units + units
     turned, turning, turned_rad = motion.turned, motion.turning, motion.turned_rad
     if abs(bend) > LEAST_BEND_1PM and units > 0.0:
         turned = MEMORY * turned + observation.yaw_rate_radps * dt_s * bend * units
         turning = MEMORY * turning + (bend * units) ** 2
         turned_rad = min(turned_rad + abs(observation.yaw_rate_radps) * dt_s, 1.0)
-    return Motion(max(smooth, 0.0), motion.steering_rad, seen_m, seen_units, turned, turning, turned_rad, motion.told)
+    return Motion(
+        max(smooth, 0.0), motion.steering_rad, motion.seen_m, motion.seen_units, turned, turning, turned_rad, motion.told
+    )
+
+
+def seen(motion: Motion, metres: float, units: float) -> Motion:
+    """The motion after frames told that so many units of the odometry were so many metres."""
+    return replace(motion, seen_m=SEEN_MEMORY * motion.seen_m + metres, seen_units=SEEN_MEMORY * motion.seen_units + units)
 
 
 def commanded(motion: Motion, acceleration_mps2: float, steering_rad: float, dt_s: float) -> Motion:

@@ -24,6 +24,7 @@ from hippodrome.core.navigation import motion as motions
 from hippodrome.core.navigation import track as tracks
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.course import offset_and_turn, path_poses
+from hippodrome.core.navigation.dashes import LEAST_M, MOST_M, LineView, driven_m, line_levels
 from hippodrome.core.navigation.driving import pace
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
 from hippodrome.core.navigation.placing import keeps_left, lane_of, lane_that_is_read
@@ -38,7 +39,6 @@ from hippodrome.core.reading.reader import RoadReader
 from hippodrome.core.reading.types import RoadReading
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, LocalizationEstimate, LocalizationStatus, Observation
-from hippodrome.core.views.odometry import VisualOdometry
 
 __all__ = ["Navigator", "NavigatorConfig", "PoseSource"]
 
@@ -95,7 +95,7 @@ class Navigator:
         self._planner = RoutePlanner(cognitive_map, network, config)
         self._side = 1.0 if keeps_left(self._planner.roads) else -1.0
         self._reader: RoadReader | None = None
-        self._odometry: VisualOdometry | None = VisualOdometry(config.camera)
+        self._line: LineView | None = None
         self._ground = Ground(config.camera)
         self._motion, self._health = motions.Motion(), SensorHealth()
         self._expected_scale = self._localizer.metres_per_unit
@@ -154,11 +154,7 @@ class Navigator:
             driven_m = self._motion.speed_mps * observation.dt_s
             self._motion = motions.told(self._motion, self._localizer.metres_per_unit, driven_m)
         scale = self._motion.metres_per_unit(self._expected_scale)
-        seen_mps = None
-        if self._odometry is not None:
-            seen_mps = self._odometry.step(observation).speed
-            self._odometry = None if known else self._odometry  # it costs more than all else, and is not needed any more
-        self._motion = motions.sensed(self._motion, observation, seen_mps, scale, config.vehicle)
+        self._motion = motions.sensed(self._motion, observation, scale, config.vehicle)
         distance_m = scale * observation.speed * observation.dt_s
         turned_rad = observation.yaw_rate_radps * observation.dt_s
         self._ground.move(distance_m, turned_rad)
@@ -184,6 +180,29 @@ class Navigator:
         turned_rad = observation.yaw_rate_radps * observation.dt_s
         border_m = self._ground.border_m(self._side)
         self._memory = remembered(self._memory, self._reading, distance_m, turned_rad, border_m, self._side)
+        if self._track is None:
+            self._see_dashes(observation)
+
+    def _see_dashes(self, observation: Observation) -> None:
+        """Let the dashes of the centre line tell the scale, as long as no view does."""
+        units = observation.speed * observation.dt_s
+        if self._line is not None:
+            self._line = LineView(self._line.levels, self._line.units + units)
+        memory = self._memory
+        if observation.frame is None or not memory.is_fresh:
+            return
+        levels = line_levels(
+            observation.frame, self._config.camera, memory.offset_m, memory.heading_rad, memory.curvature_1pm, -self._side
+        )
+        scale = self._motion.metres_per_unit(self._expected_scale)
+        line = self._line
+        if line is not None and scale * line.units < LEAST_M:
+            return
+        if line is not None and scale * line.units < MOST_M:
+            metres = driven_m(line.levels, levels, scale * line.units)
+            if math.isfinite(metres):
+                self._motion = motions.seen(self._motion, metres, line.units)
+        self._line = LineView(levels, 0.0)
 
     def _follow_localizer(self, distance_m: float, dt_s: float) -> None:
         """Begin, correct, or give up the pose that is steered by, as the localizer says."""

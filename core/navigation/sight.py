@@ -247,7 +247,14 @@ def _distance_at(field: FloatArray, corner: FloatArray, x: float, y: float) -> f
 
 @njit(cache=True)
 def _along_border(
-    field: FloatArray, corner: FloatArray, pose: FloatArray, bend: float, side: float, beside_m: float, straight_on: bool, count: int
+    field: FloatArray,
+    corner: FloatArray,
+    pose: FloatArray,
+    bend: float,
+    side: float,
+    beside_m: float,
+    straight_on: bool,
+    count: int,
 ) -> FloatArray:
     """The way: rows (count, 4) of curvature, heading, whether the border was seen, and the distance to what is no road.
 

@@ -16,7 +16,7 @@ from hippodrome.core.types import FloatArray, IntArray
 
 INDICATED_RAD = math.radians(30.0)  # a way through a junction that turns more is indicated
 SEARCH_BEHIND_M, SEARCH_AHEAD_M = 6.0, 10.0  # where the place on the path is looked for, about the last one
-REGAINED_STEP_M = 0.5
+TURN_IN_M = 1.2  # before a bend the wheels begin to turn: with it most sharp corners are driven within the lanes
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Course:
 
 def make_course(network: RoadNetwork, pieces: Sequence[Piece], goal_lane: int, goal_m: float, config: DriveConfig) -> Course:
     """The course over the stretches of lanes of a route that ends at or beyond the goal."""
-    path, starts, owner = smooth_path(network, pieces), piece_starts(pieces), piece_of_samples(pieces)
+    path, starts, owner = smooth_path(network, pieces, look_ahead_m=TURN_IN_M), piece_starts(pieces), piece_of_samples(pieces)
     begin_m = np.array([piece.begin_m for piece in pieces])
     lanes = np.array([piece.lane for piece in pieces], dtype=np.int32)
     u = STEP_M * np.arange(len(owner))

@@ -38,6 +38,7 @@ class Motion:
     turning: float = 0.0  # sum of the squares of the latter
     turned_rad: float = 0.0  # how much was turned in all, up to a bound
     told: float = math.nan  # ln(scale) as the localizer tells it, smoothed; nan until it does
+    told_m: float = 0.0  # driven since it first did
 
     def metres_per_unit(self, expected: float) -> float:
         """The scale: a mean of ln(scale) by what is expected, dashes and turns, each with its weight."""
@@ -49,7 +50,8 @@ class Motion:
             trust = min(self.turned_rad / STEERED_RAD, 1.0) ** 2 / STEERED_SIGMA**2
             total, weight = total + trust * math.log(self.turned / self.turning), weight + trust
         if not math.isnan(self.told):
-            total, weight = total + self.told / TOLD_SIGMA**2, weight + 1.0 / TOLD_SIGMA**2
+            trust = 1.0 / (TOLD_SIGMA**2 + PRIOR_SIGMA**2 * math.exp(-self.told_m / SETTLED_M))
+            total, weight = total + trust * self.told, weight + trust
         return math.exp(total / weight)
 
 
@@ -64,9 +66,7 @@ def sensed(motion: Motion, observation: Observation, metres_per_unit: float, veh
         turned = MEMORY * turned + observation.yaw_rate_radps * dt_s * bend * units
         turning = MEMORY * turning + (bend * units) ** 2
         turned_rad = min(turned_rad + abs(observation.yaw_rate_radps) * dt_s, 1.0)
-    return Motion(
-        max(smooth, 0.0), motion.steering_rad, motion.seen_m, motion.seen_units, turned, turning, turned_rad, motion.told
-    )
+    return replace(motion, speed_mps=max(smooth, 0.0), turned=turned, turning=turning, turned_rad=turned_rad)
 
 
 def seen(motion: Motion, metres: float, units: float) -> Motion:
@@ -86,4 +86,6 @@ def told(motion: Motion, metres_per_unit: float, distance_m: float) -> Motion:
     new = math.log(metres_per_unit)
     if math.isnan(motion.told):
         return replace(motion, told=new)
-    return replace(motion, told=motion.told + min(TOLD_PER_M * distance_m, 1.0) * (new - motion.told))
+    share = TOLD_PER_M if motion.told_m > 2.0 * SETTLED_M else TOLD_AT_FIRST_PER_M
+    smooth = motion.told + min(share * distance_m, 1.0) * (new - motion.told)
+    return replace(motion, told=smooth, told_m=motion.told_m + distance_m)

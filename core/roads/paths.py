@@ -57,15 +57,20 @@ def centreline(network: RoadNetwork, lane: int, along_m: FloatArray) -> FloatArr
     return np.stack([np.interp(along_m, knots, points[:, 0]), np.interp(along_m, knots, points[:, 1])], axis=1)
 
 
-def smooth_path(network: RoadNetwork, pieces: Sequence[Piece], aside_m: FloatArray | None = None) -> Path:
-    """Joints rounded, lane changes spread over ``CHANGE_S``, shifted left by ``aside_m`` (n,) where given."""
+def smooth_path(
+    network: RoadNetwork, pieces: Sequence[Piece], aside_m: FloatArray | None = None, look_ahead_m: float = LOOK_AHEAD_M
+) -> Path:
+    """Joints rounded, lane changes spread over ``CHANGE_S``, shifted left by ``aside_m`` (n,) where given.
+
+    ``look_ahead_m`` is how far before a bend the wheels begin to turn: a sharp corner is cut less far out if that is longer.
+    """
     starts = piece_starts(pieces)
     points = _on_centrelines(network, pieces, starts)
     points = points + _lane_changes(points, pieces, starts)
     points = _rounded(points)
     if aside_m is not None:
         points = points + aside_m[:, None] * _left(points)
-    return _within_turning_circle(_as_path(points))
+    return _within_turning_circle(_as_path(points), look_ahead_m)
 
 
 def sample_count(pieces: Sequence[Piece]) -> int:
@@ -144,16 +149,18 @@ def _as_path(points_m: FloatArray) -> Path:
     return Path(points_m, np.unwrap(np.arctan2(first[:, 1], first[:, 0])), curvature, stretch)
 
 
-def _within_turning_circle(path: Path) -> Path:
+def _within_turning_circle(path: Path, look_ahead_m: float) -> Path:
     """Where a car goes that follows the path but cannot turn tighter than ``MAX_CURVATURE_1PM``."""
     x, y = np.ascontiguousarray(path.points_m[:, 0]), np.ascontiguousarray(path.points_m[:, 1])
-    driven: FloatArray = _steer_along(x, y, path.heading_rad, path.curvature_1pm, path.stretch)
+    driven: FloatArray = _steer_along(x, y, path.heading_rad, path.curvature_1pm, path.stretch, look_ahead_m)
     stretch = np.maximum(np.linalg.norm(np.gradient(driven[:, :2], STEP_M, axis=0), axis=1), MIN_STRETCH)
     return Path(driven[:, :2], driven[:, 2], driven[:, 3], stretch)
 
 
 @njit(cache=True)
-def _steer_along(x: FloatArray, y: FloatArray, heading: FloatArray, curvature: FloatArray, stretch: FloatArray) -> FloatArray:
+def _steer_along(
+    x: FloatArray, y: FloatArray, heading: FloatArray, curvature: FloatArray, stretch: FloatArray, look_ahead_m: float
+) -> FloatArray:
     """kappa = kappa_path - e / l^2 - 2 psi / l (Samson, 1993, linearised), integrated over distance within the car's limits."""
     n = len(x)
     driven = np.stack((x, y, heading, curvature), axis=1)  # row: x, y, heading, curvature beside each sample of the path
@@ -164,7 +171,7 @@ def _steer_along(x: FloatArray, y: FloatArray, heading: FloatArray, curvature: F
         ref = heading[k] + share * (heading[k + 1] - heading[k])
         dx, dy = px - (x[k] + share * (x[k + 1] - x[k])), py - (y[k] + share * (y[k + 1] - y[k]))
         offset, turn = np.cos(ref) * dy - np.sin(ref) * dx, psi - ref
-        ahead = min(int((u + LOOK_AHEAD_M) / STEP_M), n - 1)
+        ahead = min(int((u + look_ahead_m) / STEP_M), n - 1)
         wanted = curvature[ahead] - offset / RETURN_M**2 - 2.0 * turn / RETURN_M
         wanted = min(max(wanted, -MAX_CURVATURE_1PM), MAX_CURVATURE_1PM)
         most = MAX_CURVATURE_SLOPE_1PM2 * FINE_STEP_M

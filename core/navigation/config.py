@@ -46,7 +46,8 @@ class DriveConfig:
     speed_share: float = 0.97  # of the speed limit: the speed is known to a few per cent only
     search_mps: float = 5.0  # without a fix
     doubt_mps: float = 4.0  # while the place is doubted
-    unsure_m: float = 1.2  # standard deviation of the position from which on the vehicle slows down
+    unsure_m: float = 2.0  # standard deviation of the position from which on the vehicle slows down
+    doubt_sigma_m: float = 3.0  # and from which on it doubts its place
     yaw_rate_radps: float = 0.5  # tight turns are driven slowly enough to turn the wheels in time
     creep_mps: float = 1.2
     error_decay_m: float = 3.0  # distance over which an offset from the path fades at low speed

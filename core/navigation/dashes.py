@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from hippodrome.core.types import FloatArray, Frame
 from hippodrome.core.views.odometry import CameraGeometry
@@ -21,6 +22,7 @@ LINE_M = 1.6  # from the middle of a lane to the line
 LEAST_LEVELS = 12.0  # standard deviation of the levels along a line with an end of a dash in view
 LEAST_AGREEMENT, CLEARER = 0.9, 0.06  # correlation of the best shift, and by how much it beats those that are not beside it
 BESIDE_M = 0.5
+LEAST_OVERLAP = 30  # of the levels of both frames
 SHARE_RANGE = (0.35, 2.8)  # of the distance that is expected
 LEAST_M, MOST_M = 0.7, 4.0  # distance between two frames that are compared
 
@@ -53,15 +55,33 @@ def line_levels(
 
 
 def driven_m(before: FloatArray, after: FloatArray, expected_m: float) -> float:
-    """The distance between two frames of which the levels are ``before`` and ``after``; nan where they do not tell."""
+    """The distance between two frames of which the levels are ``before`` and ``after``; nan where they do not tell.
+
+    Between shifts of ``STEP_M`` it is the peak of the parabola through the best one and its neighbours.
+    """
     low, high = (max(int(share * expected_m / STEP_M), 1) for share in SHARE_RANGE)
-    scores = np.full(high + 1, -1.0)
-    for shift in range(low, min(high, len(before) - 30) + 1):
-        a, b = before[shift:], after[: len(after) - shift]
-        if a.std() > LEAST_LEVELS and b.std() > LEAST_LEVELS:
-            scores[shift] = float(np.mean((a - a.mean()) * (b - b.mean())) / (a.std() * b.std()))
-    best = int(np.argmax(scores))
-    away = np.abs(np.arange(len(scores)) - best) > BESIDE_M / STEP_M
-    if scores[best] < LEAST_AGREEMENT or np.max(scores[away], initial=-1.0) > scores[best] - CLEARER:
+    return float(_best_shift(before, after, low, min(high, len(before) - LEAST_OVERLAP)))
+
+
+@njit(cache=True)
+def _best_shift(before: FloatArray, after: FloatArray, low: int, high: int) -> float:
+    if high <= low:
         return math.nan
-    return STEP_M * best
+    scores = np.full(high + 2, -1.0)
+    best = low
+    for shift in range(low, high + 1):
+        a, b = before[shift:], after[: len(after) - shift]
+        sigma_a, sigma_b = a.std(), b.std()
+        if sigma_a > LEAST_LEVELS and sigma_b > LEAST_LEVELS:
+            scores[shift] = np.mean((a - a.mean()) * (b - b.mean())) / (sigma_a * sigma_b)
+        if scores[shift] > scores[best]:
+            best = shift
+    if scores[best] < LEAST_AGREEMENT:
+        return math.nan
+    for shift in range(low, high + 1):
+        if abs(shift - best) > BESIDE_M / STEP_M and scores[shift] > scores[best] - CLEARER:
+            return math.nan
+    left, right = scores[best - 1], scores[best + 1]
+    bow = left - 2.0 * scores[best] + right
+    inner = low < best < high and bow < 0.0 and left > 0.0 and right > 0.0
+    return STEP_M * (best + (0.5 * (left - right) / bow if inner else 0.0))

@@ -24,6 +24,7 @@ class Pace:
     speed_mps: float
     indicator: Indicator
     reason: str
+    to_stop_m: float  # how far to where to stop; infinite if there is no need
 
 
 def pace(
@@ -36,6 +37,7 @@ def pace(
         wanted, reason = unsure, "slows down: the place is not known well"
     to_goal_m = course.goal_u_m - u_m
     goal_mps = stopping_mps(to_goal_m - 0.5 * config.goal_tolerance_m, GOAL_BRAKING_MPS2)
+    stop_m = to_goal_m - 0.5 * config.goal_tolerance_m
     if goal_mps < wanted:
         wanted, reason = goal_mps, "stops at the goal"
     gate = next_gate(course, u_m)
@@ -45,11 +47,12 @@ def pace(
         if to_stop_m < SIGHT_M:
             indicator = gate.indicator
         slowed, why = gate_speed_mps(to_stop_m, speed_mps, radar, config)
+        stop_m = min(stop_m, to_stop_m) if math.isfinite(slowed) else stop_m
         if slowed < wanted:
             wanted, reason = slowed, why
     if indicator is Indicator.STRAIGHT:
         indicator = _change_indicated(course, u_m)
-    return Pace(wanted if math.isfinite(wanted) else 0.0, indicator, reason)
+    return Pace(wanted if math.isfinite(wanted) else 0.0, indicator, reason, stop_m)
 
 
 def _change_indicated(course: Course, u_m: float) -> Indicator:

@@ -9,7 +9,7 @@ from hippodrome.core.navigation.speed import can_stop, stopping_mps
 from hippodrome.core.navigation.types import Lamp, Radar
 
 SIGHT_M = 30.0  # a junction farther away does not matter yet
-PASSED_M = 1.0  # whose bumper is so far beyond the line is in the junction, and leaves it
+PASSED_M = 1.6  # whose bumper is so far beyond the line is in the junction, and leaves it
 
 
 def gate_speed_mps(to_stop_m: float, speed_mps: float, radar: Radar, config: DriveConfig) -> tuple[float, str]:

@@ -13,11 +13,12 @@ from hippodrome.core.navigation.config import VehicleShape
 from hippodrome.core.types import Observation
 
 PRIOR_SIGMA = 0.28  # of ln(scale): two drives differ by a fifth each
-VISUAL_SIGMA, VISUAL_M = 0.05, 6.0  # what passing dashes tell, once they have been seen over so many metres
+VISUAL_SIGMA, VISUAL_M = 0.02, 15.0  # what passing dashes tell, once they have been seen over so many metres
 TOLD_SIGMA, TOLD_PER_M = (
     0.03,
     0.02,
 )  # what the localizer tells, and how fast it is followed: one wrong view moves its scale by a tenth
+SETTLED_M, TOLD_AT_FIRST_PER_M = 20.0, 0.1  # after a fix the localizer finds the scale within some 20 m
 STEERED_SIGMA, STEERED_RAD = 0.04, 0.4  # what turns tell, once the vehicle has turned so much
 LEAST_BEND_1PM = 0.03  # straighter driving tells nothing of the scale
 SEEN_MEMORY = 0.97  # of the sums of what was seen, per look
@@ -44,7 +45,7 @@ class Motion:
         """The scale: a mean of ln(scale) by what is expected, dashes and turns, each with its weight."""
         total, weight = math.log(expected) / PRIOR_SIGMA**2, 1.0 / PRIOR_SIGMA**2
         if self.seen_m > 0.5 and self.seen_units > 0.0:
-            trust = min(self.seen_m / VISUAL_M, 1.0) / VISUAL_SIGMA**2
+            trust = min(self.seen_m / VISUAL_M, 1.0) ** 2 / VISUAL_SIGMA**2
             total, weight = total + trust * math.log(self.seen_m / self.seen_units), weight + trust
         if self.turned > 0.0 and self.turning > 0.0:
             trust = min(self.turned_rad / STEERED_RAD, 1.0) ** 2 / STEERED_SIGMA**2

@@ -30,7 +30,7 @@ from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_mi
 from hippodrome.core.navigation.placing import keeps_left, lane_of, lane_that_is_read
 from hippodrome.core.navigation.searching import LaneMemory, remembered, search_step
 from hippodrome.core.navigation.sight import Ground
-from hippodrome.core.navigation.speed import approach_mps2, following_mps2
+from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Command, DrivingState, Goal, Indicator, Lamp, Radar
@@ -43,8 +43,11 @@ from hippodrome.core.types import CognitiveMap, LocalizationEstimate, Localizati
 __all__ = ["Navigator", "NavigatorConfig", "PoseSource"]
 
 LOOK_EVERY_S = 0.4  # the localizer's pose is taken in so often: its looks are as frequent
-APART_M, APART_SIGMAS, APART_S = 4.0, 3.5, 1.0  # the localizer has gone elsewhere: so far off, for so long
-FORGOTTEN_M = 40.0  # driven without a fix of the localizer, the pose that was steered by is given up
+APART_M, APART_SIGMAS, APART_RAD = 4.0, 3.5, 0.5  # the localizer is elsewhere: so far off
+APART_LOOKS = 12  # and for so many looks: what is steered by is the better of the two for a hundred metres without a view
+VOUCHED_LOOKS = 2  # recognised views that a new fix needs beside the localizer's own word
+BACK_ON_MAP_M = 10.0  # driven on the map again before the localizer is believed more than the lanes and dashes
+FORGOTTEN_M = 6.0  # standard deviation from which on the pose that was steered by is given up
 STANDING_MPS = 0.1
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
 OBSTACLE_M = 10.0  # who stands nearer than this before something waits for it
@@ -55,6 +58,7 @@ LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehi
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 CREEP_AFTER_S = 4.0  # stood without a road ahead and with nobody there, one creeps on
+BEGINS_M = 5.0  # so far the ground beside the vehicle has not been seen yet
 ROUND_M = 250.0  # searched round one block, then straight on to the next ones, and so in turn
 ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
 
@@ -105,10 +109,11 @@ class Navigator:
         self._track: Track | None = None
         self._plan: Plan | None = None
         self._has_goal = False
-        self._since_look_s = self._apart_s = self._standing_s = self._at_goal_s = self._search_stood_s = 0.0
-        self._since_fix_m, self._unfixed_m = 0.0, 0.0
+        self._since_look_s = self._standing_s = self._at_goal_s = self._search_stood_s = 0.0
+        self._since_fix_m = 0.0
+        self._apart_looks = self._vouched = 0
         self._misfits = self._off_road = 0
-        self._searched_m = 0.0
+        self._searched_m = self._on_map_m = 0.0
         self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
         self._refuted_m = 0.0
         self._arrived = False
@@ -180,8 +185,7 @@ class Navigator:
         turned_rad = observation.yaw_rate_radps * observation.dt_s
         border_m = self._ground.border_m(self._side)
         self._memory = remembered(self._memory, self._reading, distance_m, turned_rad, border_m, self._side)
-        if self._track is None:
-            self._see_dashes(observation)
+        self._see_dashes(observation)
 
     def _see_dashes(self, observation: Observation) -> None:
         """Let the dashes of the centre line tell the scale, as long as no view does."""
@@ -208,25 +212,36 @@ class Navigator:
         """Begin, correct, or give up the pose that is steered by, as the localizer says."""
         estimate = self.estimate
         assert estimate is not None
-        self._since_look_s += dt_s
-        self._unfixed_m = 0.0 if estimate.localized else self._unfixed_m + distance_m
-        if self._track is not None and self._unfixed_m > FORGOTTEN_M:
+        if self._track is not None and self._track.sigma_m > FORGOTTEN_M:
             self._track, self._plan = None, None
         if estimate.status is not LocalizationStatus.LOCALIZED or self._is_refuted(estimate, distance_m):
-            return  # off the map the localizer has dead reckoning alone, and here there are lanes and stop lines beside it
+            self._on_map_m, self._vouched = 0.0, 0
+            return  # off the map the localizer has dead reckoning alone, and here there are lanes and dashes beside it
+        self._on_map_m += distance_m
+        recognised = estimate.confidence >= self._config.localizer.margin
+        self._since_look_s, looked = (self._since_look_s + dt_s, False) if self._since_look_s < LOOK_EVERY_S else (0.0, True)
+        self._vouched += int(looked and recognised and distance_m > 0.0)
         if self._track is None:
-            self._restart(estimate)
+            if self._vouched >= VOUCHED_LOOKS:
+                self._restart(estimate)
             return
-        apart_m = float(np.hypot(*(estimate.pose[:2] - self._track.pose[:2])))
-        turned = abs(math.remainder(float(estimate.pose[2] - self._track.pose[2]), 2.0 * math.pi))
-        sigma_m = self._track.sigma_m + math.sqrt(max(0.5 * float(np.trace(estimate.covariance[:2, :2])), 0.0))
-        elsewhere = apart_m > max(APART_M, APART_SIGMAS * sigma_m) or turned > 0.5
-        self._apart_s = self._apart_s + dt_s if elsewhere else 0.0
-        if self._apart_s > APART_S:
-            self._restart(estimate)
-        elif not elsewhere and self._since_look_s >= LOOK_EVERY_S and distance_m > 0.0:
-            self._track = tracks.with_localizer(self._track, estimate.pose, estimate.covariance)
-            self._since_look_s = 0.0
+        if self._on_map_m < BACK_ON_MAP_M:
+            return
+        if not self._is_elsewhere(estimate, self._track):
+            self._apart_looks = 0
+            if looked and recognised and distance_m > 0.0:
+                self._track = tracks.with_localizer(self._track, estimate.pose, estimate.covariance)
+        elif looked and recognised:
+            self._apart_looks += 1
+            if self._apart_looks >= APART_LOOKS:
+                self._restart(estimate)
+
+    def _is_elsewhere(self, estimate: LocalizationEstimate, track: Track) -> bool:
+        """Whether the localizer believes in another place than the one that is steered by."""
+        apart_m = float(np.hypot(*(estimate.pose[:2] - track.pose[:2])))
+        turned = abs(math.remainder(float(estimate.pose[2] - track.pose[2]), 2.0 * math.pi))
+        sigma_m = track.sigma_m + math.sqrt(max(0.5 * float(np.trace(estimate.covariance[:2, :2])), 0.0))
+        return apart_m > max(APART_M, APART_SIGMAS * sigma_m) or turned > APART_RAD
 
     def _is_refuted(self, estimate: LocalizationEstimate, distance_m: float) -> bool:
         """Whether the localizer still says what was seen to be wrong."""
@@ -240,7 +255,8 @@ class Navigator:
 
     def _restart(self, estimate: LocalizationEstimate) -> None:
         self._track, self._plan = tracks.begun(estimate.pose, estimate.covariance), None
-        self._apart_s = self._since_fix_m = 0.0
+        self._since_fix_m = 0.0
+        self._apart_looks = self._vouched = 0
 
     def _correct_by_lane(self, observation: Observation) -> None:
         """Correct the pose by the lane, where the vehicle is on one that is no way through a junction."""
@@ -332,8 +348,19 @@ class Navigator:
         self._search_stood_s = self._search_stood_s + dt_s if speed < 2.0 * config.drive.creep_mps else 0.0
         bend = math.tan(self._motion.steering_rad) / config.vehicle.wheelbase_m
         straight_on = int(self._searched_m / ROUND_M) % 2 == 1
+        begins = self._searched_m < BEGINS_M
         step = search_step(
-            self._ground, self._memory, self._reading, radar, self._side, speed, bend, straight_on, config.drive, config.vehicle
+            self._ground,
+            self._memory,
+            self._reading,
+            radar,
+            self._side,
+            speed,
+            bend,
+            straight_on,
+            begins,
+            config.drive,
+            config.vehicle,
         )
         accel = min(
             approach_mps2(speed, step.speed_mps, config.drive), following_mps2(speed, radar, config.drive, config.vehicle)
@@ -347,13 +374,14 @@ class Navigator:
         config, speed, plan = self._config, self._motion.speed_mps, self._plan
         step = pace(plan.course, plan.u_m, speed, radar, self._track.sigma_m, config.drive, config.vehicle)
         wanted, reason, state = step.speed_mps, step.reason, DrivingState.DRIVING
-        if not self.estimate.localized:
+        if self._track.sigma_m > self._config.drive.doubt_sigma_m:
             state = DrivingState.DOUBTING
             if config.drive.doubt_mps < wanted:
                 wanted, reason = config.drive.doubt_mps, "doubts its place"
         if plan.to_goal_m < config.drive.goal_tolerance_m and speed < STANDING_MPS:
             return self._at_goal(dt_s)
         accel = min(approach_mps2(speed, wanted, config.drive), following_mps2(speed, radar, config.drive, config.vehicle))
+        accel = min(accel, stop_mps2(speed, step.to_stop_m, config.drive, config.vehicle))
         if wanted <= 0.0 and speed < STANDING_MPS:
             accel = HOLD_MPS2
         bend = path_curvature_1pm(plan.course, plan.u_m, self._track.pose, speed, config.drive)
@@ -365,7 +393,7 @@ class Navigator:
         assert self._track is not None and self.estimate is not None
         drive = self._config.drive
         self._at_goal_s += dt_s
-        if self.estimate.localized and self._track.sigma_m < drive.goal_sigma_m and self._since_fix_m > drive.settled_m:
+        if self._track.along_sigma_m < drive.goal_sigma_m and self._since_fix_m > drive.settled_m:
             self._arrived = True
             return self._standing(DrivingState.ARRIVED, "has arrived")
         if self._at_goal_s > ROUND_AGAIN_S:

@@ -7,6 +7,8 @@ import math
 from hippodrome.core.navigation.config import DriveConfig, VehicleShape
 from hippodrome.core.navigation.types import Radar
 
+LEAST_STOP_M = 0.15  # the last hand's breadth
+BEGUN_SHARE = 0.7
 LEAST_GAP_M = 0.3  # the intelligent driver model divides by the gap
 
 
@@ -41,3 +43,11 @@ def following_mps2(speed_mps: float, radar: Radar, config: DriveConfig, vehicle:
     if closing > 0.0 and closing**2 > 2.0 * config.firm_braking_mps2 * max(gap_m - 1.0, 0.1):
         return -vehicle.max_braking_mps2
     return max(accel, -vehicle.max_braking_mps2)
+
+
+def stop_mps2(speed_mps: float, to_stop_m: float, config: DriveConfig, vehicle: VehicleShape) -> float:
+    """What stops a vehicle in time, b = v^2 / (2 d), from when on that takes most of the planned braking; else infinite."""
+    needed = speed_mps**2 / (2.0 * max(to_stop_m, LEAST_STOP_M))
+    if not math.isfinite(to_stop_m) or needed < BEGUN_SHARE * config.braking_mps2:
+        return math.inf
+    return -min(needed, vehicle.max_braking_mps2)

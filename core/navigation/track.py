@@ -8,7 +8,7 @@ lane and its heading, a stop line or a junction's mouth corrects it along the la
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from hippodrome.core.reading.types import LaneEnd, RoadReading
 from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
-ALONG_PER_M = 0.02  # variance along the way that each metre adds: the scale is known to a few per cent
+ALONG_PER_M = 0.005  # variance along the way that each metre adds
+SCALE_SIGMA = 0.015  # and the share of the way that it is wrong by: passing dashes tell the scale so well
 HEADING_RAD_PER_SQRT_M = 0.003  # random walk of the heading
 SIDE_RAD = 0.005  # drift across per metre
 LOCALIZED_M, LOCALIZED_RAD = (3.0, 3.0), 0.15  # of the localizer's pose, each time: its errors repeat for tens of metres
@@ -34,16 +35,24 @@ class Track:
 
     pose: FloatArray
     covariance: FloatArray
+    since_m: FloatArray  # (2,) way since the place along it was measured: what a wrong scale makes it wrong by is a share of it
 
     @property
     def sigma_m(self) -> float:
-        """Standard deviation of the position, as the root mean square over both axes."""
-        return math.sqrt(max(0.5 * float(self.covariance[0, 0] + self.covariance[1, 1]), 0.0))
+        """Standard deviation of the position, as the root mean square over both axes, the scale's error included."""
+        whole = _with_scale(self).covariance
+        return math.sqrt(max(0.5 * float(whole[0, 0] + whole[1, 1]), 0.0))
+
+    @property
+    def along_sigma_m(self) -> float:
+        """Standard deviation along the heading."""
+        along = np.array([math.cos(self.pose[2]), math.sin(self.pose[2])])
+        return math.sqrt(max(float(along @ _with_scale(self).covariance[:2, :2] @ along), 0.0))
 
 
 def begun(pose: FloatArray, covariance: FloatArray) -> Track:
     """A track that begins at the localizer's pose."""
-    return Track(np.array(pose, dtype=np.float64), np.array(covariance, dtype=np.float64))
+    return Track(np.array(pose, dtype=np.float64), np.array(covariance, dtype=np.float64), np.zeros(2))
 
 
 def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
@@ -55,11 +64,12 @@ def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
     slope[0, 2], slope[1, 2] = -step[1], step[0]
     far = abs(distance_m)
     noise = _turned(pose[2], ALONG_PER_M * far, (SIDE_RAD * far) ** 2, HEADING_RAD_PER_SQRT_M**2 * far + (0.01 * turned_rad) ** 2)
-    return Track(pose, slope @ track.covariance @ slope.T + noise)
+    return Track(pose, slope @ track.covariance @ slope.T + noise, track.since_m + np.array(step))
 
 
 def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Track:
     """The track after the localizer's pose."""
+    track = _with_scale(track)
     noise = covariance + _turned(float(pose[2]), LOCALIZED_M[0] ** 2, LOCALIZED_M[1] ** 2, LOCALIZED_RAD**2)
     difference = pose - track.pose
     difference[2] = wrap_compiled(difference[2])
@@ -77,6 +87,7 @@ def with_lane(track: Track, reading: RoadReading, lane_point_m: FloatArray, lane
         lane_heading_rad: the lane's direction there.
     """
     fits = True
+    track = _with_scale_across(track, lane_heading_rad)
     if reading.sees_lane:
         aside = np.array([-math.sin(lane_heading_rad), math.cos(lane_heading_rad), 0.0])
         expected = float(aside[:2] @ (track.pose[:2] - lane_point_m))
@@ -97,18 +108,18 @@ def with_end(track: Track, reading: RoadReading, to_end_m: float, lane_heading_r
     if abs(nearer_m) > END_GATE_M:
         return track, False
     along = np.array([math.cos(lane_heading_rad), math.sin(lane_heading_rad), 0.0])
-    return _measured(track, along, nearer_m, reading.end_variance_m2 + END_FLOOR_M[reading.end] ** 2)
+    return _measured(_with_scale(track), along, nearer_m, reading.end_variance_m2 + END_FLOOR_M[reading.end] ** 2)
 
 
 def loosened(track: Track, heading_rad: float) -> Track:
     """The track as it is where lanes that are read again and again tell that it is wrong across."""
-    return Track(track.pose, track.covariance + _turned(heading_rad, 0.0, LOOSE_M**2, LOOSE_RAD**2))
+    return replace(track, covariance=track.covariance + _turned(heading_rad, 0.0, LOOSE_M**2, LOOSE_RAD**2))
 
 
 def farther_on(track: Track, ahead_m: float, sigma_m: float) -> tuple[Track, bool]:
     """The track after the ground told that the vehicle is ``ahead_m`` farther along its heading than believed."""
     along = np.array([math.cos(track.pose[2]), math.sin(track.pose[2]), 0.0])
-    return _measured(track, along, ahead_m, sigma_m**2)
+    return _measured(_with_scale(track), along, ahead_m, sigma_m**2)
 
 
 def beside_border(track: Track, offset_m: float, heading_rad: float, sigma_m: float) -> tuple[Track, bool]:
@@ -132,7 +143,24 @@ def _shifted(track: Track, shift: FloatArray, gain: FloatArray, rows: FloatArray
     pose = track.pose + shift
     pose[2] = wrap_compiled(pose[2])
     rest = np.eye(3) - gain @ rows
-    return Track(pose, rest @ track.covariance @ rest.T + gain @ noise @ gain.T)
+    return Track(pose, rest @ track.covariance @ rest.T + gain @ noise @ gain.T, track.since_m)
+
+
+def _with_scale(track: Track) -> Track:
+    """The track with the scale's error in its covariance, which then begins to grow anew."""
+    if not track.since_m.any():
+        return track
+    covariance = track.covariance.copy()
+    covariance[:2, :2] += SCALE_SIGMA**2 * np.outer(track.since_m, track.since_m)
+    return Track(track.pose, covariance, np.zeros(2))
+
+
+def _with_scale_across(track: Track, heading_rad: float) -> Track:
+    """The same for the part across a heading only: what a lane tells. After a turn that is what was along the way before."""
+    along = np.array([math.cos(heading_rad), math.sin(heading_rad)])
+    kept = float(along @ track.since_m) * along
+    across = _with_scale(replace(track, since_m=track.since_m - kept))
+    return replace(across, since_m=kept)
 
 
 def _turned(heading_rad: float, sq_along: float, sq_across: float, sq_heading: float) -> FloatArray:

@@ -91,4 +91,4 @@ class KnownPose(PoseSource):
 def _estimate(t_s: float, pose: FloatArray, covariance: FloatArray) -> LocalizationEstimate:
     none = np.zeros((0, 2, 2))
     heads = np.full(2, pose[2])
-    return LocalizationEstimate(t_s, pose, covariance, True, 0.0, -1, heads, np.ones(2), none, none, LocalizationStatus.LOCALIZED)
+    return LocalizationEstimate(t_s, pose, covariance, True, 9.0, -1, heads, np.ones(2), none, none, LocalizationStatus.LOCALIZED)

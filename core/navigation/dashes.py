@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from hippodrome.core.reading.config import ReaderConfig
 from hippodrome.core.types import FloatArray, Frame
 from hippodrome.core.views.odometry import CameraGeometry
 
 NEAR_M, FAR_M, STEP_M = 3.7, 12.5, 0.1  # ahead of the rear axle; beyond it a pixel spans more than a metre
 ASIDE_M = np.linspace(-0.3, 0.3, 7)  # about where the line is expected
+PAINT_M = ReaderConfig().paint_m  # height of the paint above the ground that the camera's height is measured from
 LINE_M = 1.6  # from the middle of a lane to the line
 LEAST_LEVELS = 12.0  # standard deviation of the levels along a line with an end of a dash in view
 LEAST_AGREEMENT, CLEARER = 0.9, 0.06  # correlation of the best shift, and by how much it beats those that are not beside it
@@ -44,7 +46,7 @@ def line_levels(
     ahead = np.arange(NEAR_M, FAR_M, STEP_M)
     middle = -offset_m - heading_rad * ahead + 0.5 * curvature_1pm * ahead**2 + line_side * LINE_M
     depth = ahead - camera.forward_m
-    row = np.clip(np.rint(0.5 * (height - 1) + focal * camera.height_m / depth), 0, height - 1).astype(np.int64)
+    row = np.clip(np.rint(0.5 * (height - 1) + focal * (camera.height_m - PAINT_M) / depth), 0, height - 1).astype(np.int64)
     aside = middle[:, None] + ASIDE_M[None, :]
     column = np.clip(np.rint(0.5 * (width - 1) - focal * aside / depth[:, None]), 0, width - 1).astype(np.int64)
     level = frame[row[:, None], column].astype(np.float64)

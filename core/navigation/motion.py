@@ -19,7 +19,7 @@ TOLD_SIGMA, TOLD_PER_M = (
     0.02,
 )  # what the localizer tells, and how fast it is followed: one wrong view moves its scale by a tenth
 SETTLED_M, TOLD_AT_FIRST_PER_M = 20.0, 0.1  # after a fix the localizer finds the scale within some 20 m
-STEERED_SIGMA, STEERED_RAD = 0.04, 0.4  # what turns tell, once the vehicle has turned so much
+STEERED_SIGMA, STEERED_RAD = 0.07, 0.4  # what turns tell, once the vehicle has turned so much
 LEAST_BEND_1PM = 0.03  # straighter driving tells nothing of the scale
 SEEN_MEMORY = 0.97  # of the sums of what was seen, per look
 MEMORY = 0.997  # of the sums, per step of a tenth of a second: the scale wanders over some hundred metres

@@ -326,6 +326,8 @@ class Navigator:
         if complaint:
             limit = 0.0 if halt else self._config.drive.search_mps / 2.0
             slowed = min(command.acceleration_mps2, self._config.drive.speed_gain_1ps * (limit - self._motion.speed_mps))
+            if halt and self._motion.speed_mps < STANDING_MPS:
+                slowed = HOLD_MPS2
             state = DrivingState.HALTED if halt else DrivingState.DOUBTING
             command = replace(command, acceleration_mps2=max(slowed, -3.0), state=state, reason=complaint)
         self._look_for_blockage(radar, dt_s)

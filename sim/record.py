@@ -131,7 +131,7 @@ def simulate(plan: RecordingPlan) -> tuple[Drive, Samples]:
 
 def _simulate(plan: RecordingPlan, folder: Path) -> None:
     drive, samples = simulate(plan)
-    _write_drive(folder / "drive.npz", drive)
+    write_drive(folder / "drive.npz", drive)
     write_arrays(folder / "samples.npz", {field.name: np.asarray(getattr(samples, field.name)) for field in fields(samples)})
 
 
@@ -156,7 +156,7 @@ def _numbers(samples: Samples, chunk: int) -> range:
 
 @lru_cache(maxsize=1)
 def _episode_of(folder: Path) -> tuple[Samples, Drive]:
-    return read_samples(folder / "samples.npz"), _read_drive(folder / "drive.npz")
+    return read_samples(folder / "samples.npz"), read_drive(folder / "drive.npz")
 
 
 _live: list[tuple[tuple[Scenario, Role], FrameRenderer]] = []
@@ -187,14 +187,14 @@ def finish(plan: RecordingPlan) -> Recording:
     folder = plan.folder()
     if (folder / MANIFEST).exists():
         return open_recording(folder)
-    drive = _read_drive(folder / "drive.npz")
+    drive = read_drive(folder / "drive.npz")
     tour = {"coverage": round(drive.coverage, 4), "revisit_share": round(drive.revisit_share, 4)}
     return seal(folder, {**plan.content(), "tour": tour}, read_samples(folder / "samples.npz"))
 
 
 def sensed_anew(recording: Recording, noise: SelfMotionNoise, rng: np.random.Generator) -> Recording:
     """The same drive and frames with another self-motion: what changes is what the odometry says, not where the car was."""
-    drive, samples = _read_drive(recording.folder / "drive.npz"), recording.samples
+    drive, samples = read_drive(recording.folder / "drive.npz"), recording.samples
     motion = sense_self_motion(drive, 1.0 / float(samples.dt_s[0]), noise, rng)
     return replace(recording, samples=replace(samples, speed=motion.speed, yaw_rate_radps=motion.yaw_rate_radps))
 
@@ -206,13 +206,15 @@ def record(plan: RecordingPlan) -> Recording:
     return finish(plan)
 
 
-def _write_drive(path: Path, drive: Drive) -> None:
+def write_drive(path: Path, drive: Drive) -> None:
+    """A drive on disk, with the traffic around it."""
     log = {f"traffic_{field.name}": getattr(drive.traffic, field.name) for field in fields(TrafficLog)}
     own = {field.name: getattr(drive, field.name) for field in fields(Drive) if field.name != "traffic"}
     write_arrays(path, {**{name: value for name, value in own.items() if value is not None}, **log})
 
 
-def _read_drive(path: Path) -> Drive:
+def read_drive(path: Path) -> Drive:
+    """A drive back from disk. Raises RecordingError."""
     log_names = [field.name for field in fields(TrafficLog)]
     names = [field.name for field in fields(Drive) if field.name not in ("traffic", "heights_m")]
     try:

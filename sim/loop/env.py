@@ -155,7 +155,7 @@ class TownEnv(gymnasium.Env[Observed, Action]):
         if observation.frame is not None:
             self._frame = observation.frame
         return {
-            "frame": self._frame,
+            "frame": self._frame if observation.frame is not None else self._frame.copy(),
             "speed": _boxed(observation.speed, FASTEST_UNITS),
             "yaw_rate": _boxed(observation.yaw_rate_radps, FASTEST_TURN_RADPS),
             **(_radar(sensed.radar) if self.options.radar else {}),

@@ -159,6 +159,12 @@ class Ground:
         """The lanes that lead into ``lane``."""
         return self._before[lane]
 
+    def is_paved(self, point_m: FloatArray) -> bool:
+        """Whether a point (2,) lies on a lane, a junction or a turning place."""
+        near = self.near(point_m[None])
+        on_lane = (near.distance_m[0] <= self._half_width_m[near.lane]) & ~near.beyond[0]
+        return bool(on_lane.any()) or bool(self.in_areas(point_m[None])[0])
+
     def in_areas(self, points_m: FloatArray) -> NDArray[np.bool_]:
         """Whether points (P, 2) lie in junctions or turning places."""
         inside = np.zeros(len(points_m), dtype=np.bool_)

@@ -21,7 +21,8 @@ class Puppet:
 
     def __init__(self, network: RoadNetwork, ways: Ways) -> None:
         self._network, self._ways = network, ways
-        self._route: tuple[str, ...] = ()
+        self._route: tuple[str, ...] = ()  # what SUMO was told; empty where it did not take it
+        self._last_route: tuple[str, ...] = ()
         self._routes = 0
         self.put_back = 0  # how often SUMO had taken the ego off the road
         self.misplaced = 0  # steps after which SUMO had the ego on another lane than told: others may not have seen it
@@ -76,7 +77,7 @@ class Puppet:
     def _insert(self, route: tuple[str, ...]) -> None:
         """Sends the ego on its way; it is on the road as soon as it has been moved there."""
         self._routes += 1
-        self._route = route or self._route
+        self._route = self._last_route = route or self._last_route
         libsumo.route.add(f"ego-{self._routes}", list(self._route))
         if EGO in libsumo.simulation.getPendingVehicles():
             libsumo.vehicle.remove(EGO)
@@ -87,6 +88,6 @@ class Puppet:
         """Tells SUMO where the ego goes. Where the ego is not on that route in SUMO's eyes, it is told at a later step."""
         try:
             libsumo.vehicle.setRoute(EGO, list(route))
-            self._route = route
+            self._route = self._last_route = route
         except libsumo.TraCIException:
             self._route = ()

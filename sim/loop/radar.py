@@ -16,6 +16,7 @@ from hippodrome.sim.loop.users import Users
 
 REACH_M: Final = 100.0  # of an ordinary 77 GHz radar, in town
 BESIDE_M: Final = 0.3  # so much room is kept on each side of the ego's own swept path
+MOST_TURN_RAD: Final = 0.5 * math.pi  # the swept path ends where it has turned by a right angle
 GAP_NOISE_M: Final = 0.1  # standard deviations of a measurement
 SPEED_NOISE_MPS: Final = 0.1
 
@@ -38,7 +39,8 @@ def nearest_ahead(pose_m: tuple[float, float, float], curvature_1pm: float, user
         radius = 1.0 / curvature_1pm
         along = np.arctan2(forward, (radius - left) * np.sign(radius)) * abs(radius)
         aside = radius - np.sign(radius) * np.hypot(forward, radius - left)
-    inside = (np.abs(aside) <= 0.5 * WIDTH_M + BESIDE_M) & (along > CENTRE_AHEAD_M) & (along < REACH_M + REAR_AXLE_TO_FRONT_M)
+    far = min(REACH_M, MOST_TURN_RAD / max(abs(curvature_1pm), 1e-6))  # who steers to and fro does not drive in a circle
+    inside = (np.abs(aside) <= 0.5 * WIDTH_M + BESIDE_M) & (along > CENTRE_AHEAD_M) & (along < far + REAR_AXLE_TO_FRONT_M)
     if not inside.any():
         return math.inf, 0.0
     along = np.where(inside, along, np.inf)

@@ -25,12 +25,13 @@ class Rights:
         self._lane = {name: lane for lane, name in enumerate(network.lane_ids)}
         self.junction_of: dict[int, str] = {}  # of the lanes inside junctions
         self.signal_of: dict[int, tuple[str, int]] = {}  # traffic light and number of the lamp, of first lanes inside junctions
+        self.phases: dict[str, list[str]] = {}  # states of each traffic light, in all of its programs
         self._link: dict[int, int] = {}
         self._response: dict[str, list[int]] = {}
         self._foes: dict[str, list[int]] = {}
         self._inner: dict[str, list[str]] = {}
         self._vias: dict[int, int] = {}  # the lane that follows inside a junction
-        self._junction = ""
+        self._junction, self._signal = "", ""
         self._read(net_file)
         for junction, lanes in self._inner.items():
             for link, name in enumerate(lanes[: len(self._response.get(junction, ()))]):
@@ -83,6 +84,10 @@ class Rights:
         elif tag == "request" and not self._junction.startswith(":"):
             self._response.setdefault(self._junction, []).append(int(attributes["response"], 2))
             self._foes.setdefault(self._junction, []).append(int(attributes["foes"], 2))
+        elif tag == "tlLogic":
+            self._signal = attributes["id"]
+        elif tag == "phase":
+            self.phases.setdefault(self._signal, []).append(attributes["state"])
         elif tag == "connection" and attributes.get("via") in self._lane:
             via = self._lane[attributes["via"]]
             if attributes["from"].startswith(":"):

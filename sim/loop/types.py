@@ -43,7 +43,7 @@ class Truth:
             junction, off the paving; 0 inside.
         off_paving_m: how far the worst wheel is off everything paved for cars: lanes, junctions, turning places; 0 on it.
         in_junction: whether the rear axle is on a lane inside a junction.
-        driven_m: way of the rear axle since the reset.
+        driven_m: way of the rear axle since the reset, seen from above.
     """
 
     t_s: float

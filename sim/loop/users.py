@@ -49,7 +49,7 @@ class Onlooker:
             if name == EGO or (x - x_m) ** 2 + (y - y_m) ** 2 > SIGHT_M**2:
                 continue
             half = 0.5 * float(VEHICLE_SIZES_M[self._kind(name), 0])
-            heading = math.radians(90.0 - libsumo.vehicle.getAngle(name))
+            heading = math.remainder(math.radians(90.0 - libsumo.vehicle.getAngle(name)), math.tau)
             names.append(name)
             poses.append((x - half * math.cos(heading), y - half * math.sin(heading), heading, *self._height(name, half)))
             speeds.append(libsumo.vehicle.getSpeed(name))

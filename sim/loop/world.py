@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import ClassVar, Final, Self
@@ -12,19 +13,23 @@ import libsumo
 import numpy as np
 
 from hippodrome.core.navigation.types import Indicator
-from hippodrome.core.types import FloatArray, Frame, HippodromeError, Observation
-from hippodrome.sim.ego import LENGTH_M, REAR_AXLE_TO_FRONT_M, WHEELBASE_M
+from hippodrome.core.types import Frame, HippodromeError, Observation
+from hippodrome.sim.ego import LENGTH_M
 from hippodrome.sim.loop.ahead import Lookout
-from hippodrome.sim.loop.car import Car, ahead_of
+from hippodrome.sim.loop.barriers import bar, closed_edges
+from hippodrome.sim.loop.car import Car
 from hippodrome.sim.loop.events import Watch
 from hippodrome.sim.loop.footing import height_and_pitch, stand
 from hippodrome.sim.loop.ground import Ground
+from hippodrome.sim.loop.lamps import signal_heads
 from hippodrome.sim.loop.moment import Moment
 from hippodrome.sim.loop.odometry import Odometry
 from hippodrome.sim.loop.puppet import Puppet
 from hippodrome.sim.loop.radar import measured, nearest_ahead
+from hippodrome.sim.loop.recorder import Recorder
 from hippodrome.sim.loop.rights import Rights
 from hippodrome.sim.loop.sight import Sight
+from hippodrome.sim.loop.start import clear_room, drawn_start, lane_and_position, points_of
 from hippodrome.sim.loop.top_view import TopView
 from hippodrome.sim.loop.types import EventKind, LanePlace, Sensed, Truth
 from hippodrome.sim.loop.users import Onlooker
@@ -41,8 +46,6 @@ STEP_S: Final = SUMO_STEP_S
 WARM_UP_S: Final = 20.0  # traffic spreads before the ego is there
 REFILL_STEPS: Final = 10  # traffic is topped up once a second
 ROAM_PER_VEHICLE_M: Final = 200.0  # as for recorded drives
-ROOM_AHEAD_M: Final = 12.0  # at the start the road is clear this far before and behind the ego
-ENDS_M: Final = 3.0  # a drawn start keeps this far from its lane's ends
 
 
 class World:
@@ -55,11 +58,12 @@ class World:
         scenario: what to build; its camera, noise and localization drive count.
         root: folder below which generated towns are kept.
         draw: whether frames are drawn; without them observations have none, no GL is needed and a step costs a third.
+        closed: SUMO's names of roads on which nobody gets through: a van stands across each lane, and traffic goes elsewhere.
     """
 
     _live: ClassVar[World | None] = None  # SUMO and GL are one per process: whoever is reset takes them
 
-    def __init__(self, scenario: Scenario, root: Path, draw: bool = True) -> None:
+    def __init__(self, scenario: Scenario, root: Path, draw: bool = True, closed: Sequence[str] = ()) -> None:
         self.scenario = scenario
         self.town = build_town(scenario.town, scenario.seed, root / "towns")
         self.network = self.town.network
@@ -69,10 +73,14 @@ class World:
         self._rights = Rights(self.town.net_file, self.network)
         self._lookout = Lookout(self.ground, self.ways, self._rights)
         mapped_m = (1.0 - scenario.mapping.tour.revisit_share) * scenario.mapping.tour.planned_length_m()
-        self._area = toured_area(self._graph, max(mapped_m, ROAM_PER_VEHICLE_M * self._drive.traffic.vehicles))
+        area = toured_area(self._graph, max(mapped_m, ROAM_PER_VEHICLE_M * self._drive.traffic.vehicles))
+        self._closed = closed_edges(self.network, closed)
+        self._area = area[~np.isin(self._graph.edges[area], self._closed)]
         self._walls = Walls(self.town, scenario.seed, scene_origin_m(self.town))
-        self._sight = Sight(scenario, self.town, self._points_of_area(), STEP_S)
+        self.heads = signal_heads(self.ground, self.ways, self._rights)
+        self._sight = Sight(scenario, self.town, points_of(self.network, self._graph.edges[self._area]), self.heads, STEP_S)
         self._draw = draw
+        self._recorder: Recorder | None = None
         self._sumo: ExitStack | None = None
 
     @property
@@ -113,12 +121,16 @@ class World:
         World._live = self
         rng_traffic, rng_start, self._rng_odometry, self._rng_radar = (np.random.default_rng([seed, k]) for k in range(4))
         self._seed, ego = seed, self._drive.ego
-        lane, position_m = self._start(start, rng_start)
+        edges = self._graph.edges[self._area]
+        place = drawn_start(self.network, edges, rng_start) if start is None else lane_and_position(self.network, start)
+        lane, position_m = place
         self._sumo = ExitStack()
         types = vehicle_types_xml(ego.accel_mps2, ego.decel_mps2, LENGTH_M)
         self._sumo.enter_context(sumo_run(self.town.net_file, types, seed))
         climbs = self.town.heights_m is not None
-        self._others = BackgroundTraffic(self._drive.traffic, self.network, self._graph, self._area, rng_traffic, climbs)
+        vans = bar(self.network, self._closed)
+        traffic = self._drive.traffic.model_copy(update={"vehicles": self._drive.traffic.vehicles + vans})
+        self._others = BackgroundTraffic(traffic, self.network, self._graph, self._area, rng_traffic, climbs)
         self._watch = Watch(self._rights)
         self._onlooker, self._puppet = Onlooker(climbs), Puppet(self.network, self.ways)
         self._odometry = Odometry(self.scenario.self_motion_noise, self._rng_odometry)
@@ -131,7 +143,7 @@ class World:
         self._lane, self._front_lane, self._before = lane, lane, lane
         self._indicator, self._accel_mps2 = Indicator.STRAIGHT, 0.0
         self._signals: dict[int, str] = {}
-        self.cleared = self._clear_room()
+        self.cleared = clear_room(self._onlooker.near(*self._car.pose_m[:2]), self._car.pose_m)
         self._move()
         return self._sensed(0.0, 0.0)
 
@@ -154,53 +166,21 @@ class World:
             raise HippodromeError(
                 f"world: command ({acceleration_mps2}, {steering_rad}) at {self._steps * STEP_S:.1f} s is not two finite numbers"
             )
-        before, speed, heading = self._car.pose_m, self._car.speed_mps, self._car.heading_rad
+        (x, y, _), speed, heading = self._car.pose_m, self._car.speed_mps, self._car.heading_rad
         self._car.drive(acceleration_mps2, steering_rad, STEP_S)
+        travelled = math.hypot(self._car.pose_m[0] - x, self._car.pose_m[1] - y)
+        self._driven_m += travelled
         self._indicator, self._accel_mps2 = indicator, (self._car.speed_mps - speed) / STEP_S
         self._steps += 1
         if self._steps % REFILL_STEPS == 0:
             self._others.refill(ego_on_road=True)
         self._move()
-        now = self._car.pose_m
-        travelled = math.hypot(now[0] - before[0], now[1] - before[1])
-        self._driven_m += travelled
         return self._sensed(travelled, self._car.heading_rad - heading)
 
     def teleport(self, pose_m: tuple[float, float, float]) -> None:
         """Stands the ego somewhere else, for tests and experiments; it is there from the next step on."""
         self._car = Car(*pose_m)
         self._lane = self._front_lane = self._before = -1
-
-    def _start(self, start: LanePlace | None, rng: np.random.Generator) -> tuple[int, float]:
-        """Lane and position of the rear axle at the start."""
-        network = self.network
-        if start is not None:
-            if start.lane_id not in network.lane_ids:
-                raise HippodromeError(f"{self.town.net_file}: no lane {start.lane_id!r} for cars, where the drive is to start")
-            return network.lane_ids.index(start.lane_id), start.position_m
-        room = REAR_AXLE_TO_FRONT_M + 2.0 * ENDS_M
-        lengths = network.lane_lengths_m()
-        inside = np.isin(network.lane_edge, self._graph.edges[self._area]) & ~network.is_internal
-        long = np.flatnonzero(inside & (lengths > room))
-        lanes = long if len(long) else np.flatnonzero(inside)
-        spare = np.maximum(lengths[lanes] - room, 0.1)
-        lane = int(rng.choice(lanes, p=spare / spare.sum()))
-        return lane, min(ENDS_M, 0.5 * float(lengths[lane])) + float(rng.uniform(0.0, max(lengths[lane] - room, 0.0)))
-
-    def _points_of_area(self) -> FloatArray:
-        """Points (n, 2) of the lanes that traffic and the ego drive on: what can be seen from them is drawn."""
-        network = self.network
-        inside = np.isin(network.lane_edge, self._graph.edges[self._area])
-        return network.points_m[np.repeat(inside, np.diff(network.point_start))]
-
-    def _clear_room(self) -> int:
-        """Takes the vehicles off the road that are where the ego begins; how many."""
-        users = self._onlooker.near(*self._car.pose_m[:2])
-        middle = ahead_of(self._car.pose_m, 0.5 * WHEELBASE_M)
-        near = np.hypot(*(users.poses_m[:, :2] - middle).T) < ROOM_AHEAD_M
-        for k in np.flatnonzero(near):
-            libsumo.vehicle.remove(users.names[k])
-        return int(near.sum())
 
     def _move(self) -> None:
         """Finds the ego's lanes, tells SUMO, lets SUMO step, and looks round."""
@@ -210,6 +190,7 @@ class World:
         last = self._before
         if self._front_lane >= 0 and not self.network.is_internal[self._front_lane]:
             self._before = self._front_lane
+        self._lift = height_and_pitch(self.ground, pose, self._footing)
         speed, put_back = self._car.speed_mps, self.put_back
         try:
             self._puppet.place(self._footing.front_m, speed, self._front_lane, self._before, self._indicator)
@@ -242,19 +223,43 @@ class World:
 
     def _sensed(self, travelled_m: float, turned_rad: float) -> Sensed:
         truth, pose = self._truth, self._truth.pose_m
-        speed, yaw_rate = self._odometry.sense(travelled_m, turned_rad, STEP_S)
+        speed, yaw_rate = self._odometry.sense(travelled_m / self._level(), turned_rad, STEP_S)
         gap, other = nearest_ahead(pose, self._car.curvature_1pm, self._users)
         radar = measured(gap, other, self._car.speed_mps, self._ahead.way_is_free, self._ahead.lamp, self._rng_radar)
         frame: Frame | None = None
         if self._draw and self._sight.is_due(self._steps):
-            seen_from = np.array([*pose, *height_and_pitch(self.ground, pose, self._footing)])
+            seen_from = np.array([*pose, *self._lift])
             frame = self._sight.frame(seen_from, self._users, np.random.default_rng([self._seed, self._steps]))
         observation = Observation(truth.t_s, STEP_S, speed, yaw_rate, frame)
-        return Sensed(observation, radar, truth, self._events, self._users.poses_m)
+        sensed = Sensed(observation, radar, truth, self._events, self._users.poses_m)
+        if self._recorder is not None:
+            self._recorder.add(sensed, self._users, self._seed, self._lift[:1])
+        return sensed
+
+    @contextmanager
+    def recording(self, folder: Path) -> Iterator[None]:
+        """Writes the drive that begins with the next ``reset`` in the block as a recording, which is finished after the block.
+
+        Args:
+            folder: which must not exist, or be empty.
+
+        Raises:
+            HippodromeError: there is something in the folder, or no drive was made.
+        """
+        self._recorder = Recorder(folder, self.scenario, self.network)
+        try:
+            yield
+            self._recorder.finish(self.town.net_file)
+        finally:
+            self._recorder = None
 
     def picture(self, view: TopView) -> Frame:
         """The town from above, as it is now."""
         return view.draw(self._car.pose_m, self._users.poses_m, self._users.sizes_m)
+
+    def _level(self) -> float:
+        """Metres seen from above, as the bicycle is driven, per metre along the slope, as its wheels roll."""
+        return math.cos(self._lift[1]) if self._lift else 1.0
 
     def _expected(self) -> int:
         """The first lane inside the junction ahead that the indicator means; in the junction, the one that the front is on."""
@@ -270,7 +275,7 @@ class World:
             x_m=pose[0],
             y_m=pose[1],
             heading_rad=pose[2],
-            speed_mps=car.speed_mps,
+            speed_mps=car.speed_mps / self._level(),
             yaw_rate_radps=car.speed_mps * car.curvature_1pm,
             acceleration_mps2=self._accel_mps2,
             steering_rad=car.steering_rad,

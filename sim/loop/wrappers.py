@@ -51,6 +51,4 @@ class WithoutTruth(gymnasium.Wrapper[Observed, Action, Observed, Action]):
         return observed, reward, terminated, truncated, {}
 
 
-def without_truth(env: gymnasium.Env[Observed, Action]) -> gymnasium.Env[Observed, Action]:
-    """The environment with an empty ``info``."""
-    return WithoutTruth(env)
+without_truth = WithoutTruth

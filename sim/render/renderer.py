@@ -13,7 +13,7 @@ from hippodrome.sim.render.camera import CameraSpec, camera_position_m, camera_t
 from hippodrome.sim.render.flat import FlatPrimitive, FlatRenderer, LevelCamera
 from hippodrome.sim.render.gl import pyrender
 from hippodrome.sim.render.vehicles import vehicle_mesh
-from hippodrome.sim.scene.types import Scene
+from hippodrome.sim.scene.types import Scene, Tile
 
 FINE_DETAIL_M = 0.7  # window, sign, lane line: left out where this length covers less than a rendered pixel
 NO_POSES = np.zeros((0, 3))
@@ -59,6 +59,12 @@ class FrameRenderer:
         if FrameRenderer._open is self:
             FrameRenderer._open = None
             self._offscreen.delete()
+
+    def add_moving(self, tile: Tile) -> FlatPrimitive:
+        """Draws another thing with the vehicles from now on; ``replace`` of what is returned changes it."""
+        primitive = FlatPrimitive(tile)
+        self._gl_scene.add(pyrender.Mesh([primitive]), name="moving")
+        return primitive
 
     def render(
         self,

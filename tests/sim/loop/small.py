@@ -52,10 +52,10 @@ def next_lane(world, lane, indicator):
 ARMS = {"w": (-120, 0), "e": (120, 0), "n": (0, 120), "s": (0, -120)}
 
 
-def crossing(folder, kind="priority", lanes=1, left_hand=False):
+def crossing(folder, kind="priority", lanes=1, hill_m=0.0, options=()):
     """A crossing of four streets with dead ends; the one from w to e has priority. Edges are called w-c, c-e and so on."""
     nodes, edges, net = (folder / f"crossing.{part}.xml" for part in ("nod", "edg", "net"))
-    rows = [f'<node id="{n}" x="{x}" y="{y}"/>' for n, (x, y) in ARMS.items()]
+    rows = [f'<node id="{n}" x="{x}" y="{y}" z="{hill_m if n == "e" else 0}"/>' for n, (x, y) in ARMS.items()]
     nodes.write_text(f'<nodes><node id="c" x="0" y="0" type="{kind}" radius="6"/>' + "".join(rows) + "</nodes>")
     common = f'numLanes="{lanes}" speed="8.33" width="3.2"'
     rows = [
@@ -65,8 +65,7 @@ def crossing(folder, kind="priority", lanes=1, left_hand=False):
     ]
     edges.write_text("<edges>" + "".join(rows) + "</edges>")
     files = f"--node-files={nodes}", f"--edge-files={edges}", f"--output-file={net}"
-    side = ("--lefthand=true",) if left_hand else ()
-    run_tool("netconvert", *files, "--offset.disable-normalization=true", "--no-turnarounds.except-deadend=true", *side)
+    run_tool("netconvert", *files, "--offset.disable-normalization=true", "--no-turnarounds.except-deadend=true", *options)
     return {"network": str(net)}
 
 

@@ -1,11 +1,11 @@
 """The environment of Gymnasium: its own checker, what is observed and paid, and a lane keeper of thirty lines."""
 
+import runpy
 import tomllib
 import warnings
 from importlib import import_module
 from pathlib import Path
 
-import cv2
 import gymnasium
 import numpy as np
 import pytest
@@ -121,28 +121,8 @@ def test_goal_and_start_by_options(make):
         env.reset(options={"begin": start})
 
 
-def lane_keeper(observed):
-    """A stranger's policy: the middle between what is painted white on the left and on the right, a little way ahead."""
-    grey = cv2.cvtColor(observed["frame"], cv2.COLOR_RGB2GRAY).astype(np.float32)
-    height, width = grey.shape
-    band = grey[int(0.68 * height) : int(0.85 * height)]
-    bright = band > np.median(band) + 60.0
-    columns = np.arange(width)
-    middle = 0.5 * width
-    offsets = []
-    for row in bright:
-        left, right = columns[row & (columns < middle)], columns[row & (columns >= middle)]
-        if len(left) and len(right):
-            offsets.append(0.5 * (left[-1] + right[0]) - middle)
-    aim = float(np.median(offsets)) / width if offsets else 0.0
-    return np.array([0.15 if observed["speed"][0] < 2.0 else -0.05, np.clip(-1.2 * aim, -0.3, 0.3)], dtype=np.float32)
-
-
-def test_a_lane_keeper_of_thirty_lines_runs_and_is_scored(make):
-    env = without_truth(make(duration_s=20.0))
-    observed, _ = env.reset(seed=3)
-    total, ended = 0.0, False
-    while not ended:
-        observed, reward, terminated, truncated, _ = env.step(lane_keeper(observed))
-        total, ended = total + reward, terminated or truncated
-    assert np.isfinite(total)
+def test_the_lane_keeper_of_the_examples_runs_and_is_scored(tmp_path):
+    """Thirty lines of a stranger, which know nothing but what is observed."""
+    keeper = runpy.run_path(str(Path(__file__).parents[3] / "examples/loop/lane_keeper.py"))
+    worth = keeper["main"](small.scenario(vehicles=2), seed=3, root=tmp_path, duration_s=8.0)
+    assert worth > 10.0

@@ -3,10 +3,14 @@
 import math
 
 import libsumo
+import numpy as np
 import pytest
 
 from hippodrome.core.navigation.types import Indicator, Lamp
+from hippodrome.core.types import HippodromeError
+from hippodrome.sim.loop.radar import nearest_ahead
 from hippodrome.sim.loop.types import EventKind, LanePlace
+from hippodrome.sim.loop.users import Users
 from hippodrome.sim.loop.world import World
 from tests.sim.loop import small
 
@@ -123,3 +127,36 @@ def test_a_red_light_run_is_seen_and_a_green_one_is_none(signals_town):
     assert set(lamps.values()) == {Lamp.GREEN, Lamp.RED}
     for arm, lamp in lamps.items():
         assert kinds[arm] == ([EventKind.RED_LIGHT] if lamp == Lamp.RED else [])
+
+
+def test_a_closed_street_is_barred_and_traffic_goes_elsewhere(tmp_path):
+    scenario = small.scenario(vehicles=6)
+    with World(scenario, tmp_path, draw=False) as world:
+        lane = int(np.flatnonzero(~world.network.is_internal)[3])
+        edge, start = world.network.edge_ids[world.network.lane_edge[lane]], world.network.lane_ids[lane]
+    with World(scenario, tmp_path, draw=False, closed=[edge]) as world:
+        sensed = world.reset(1, LanePlace(start, 2.0))
+        gaps = []
+        for _ in range(700):
+            sensed = world.step(*small.keeper(world, sensed))
+            gaps.append(sensed.radar.gap_m)
+            on_it = [name for name in libsumo.vehicle.getIDList() if libsumo.vehicle.getRoadID(name) == edge]
+            assert set(on_it) <= {"ego", f"closed-{start}"}
+        assert gaps[-1] == pytest.approx(3.0, abs=1.0)
+        assert sensed.truth.speed_mps < 0.2
+    with pytest.raises(HippodromeError, match="no road 'nowhere'"):
+        World(scenario, tmp_path, draw=False, closed=["nowhere"])
+
+
+def test_the_radar_follows_the_steering_and_looks_no_further_than_a_right_angle():
+    pose = (0.0, 0.0, 0.0)
+
+    def gap(x, y, curvature):
+        users = Users(("a",), np.array([1]), np.array([0], np.uint8), np.array([[x, y, 0.0]]), np.array([2.0]))
+        return nearest_ahead(pose, curvature, users)
+
+    assert gap(23.6 + 2.15, 0.0, 0.0) == (pytest.approx(20.0), pytest.approx(2.0))
+    assert gap(20.0, 4.0, 0.0)[0] == math.inf
+    assert gap(20.0, 4.0, 2.0 * 4.0 / (20.0**2 + 4.0**2))[0] < 20.0
+    assert gap(-20.0, 0.0, 0.0)[0] == math.inf
+    assert gap(0.0, 10.0, 0.2)[0] == math.inf

@@ -17,6 +17,7 @@ NAMES = {
     "mapping": "building maps",
     "localization": "localizing in a map",
     "matching": "matching a drive to lanes, beside two well-known map matchers",
+    "reading": "reading the road in frames",
     "stream": "feeding a program frame by frame",
     "scaling": "refinement time and memory against the length of the drive",
 }

@@ -22,6 +22,7 @@ from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.localization.fix import Fix, PlaceCheck, RecognisedView, challenger_wins, checked, faded, recognised, status
 from hippodrome.core.localization.places import LINK_REACH_M, cells_around, make_place_map, may_be_on_road
 from hippodrome.core.localization.recogniser import PlaceMatch, PlaceRecogniser
+from hippodrome.core.localization.road import RoadSense
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import (
     CognitiveMap,
@@ -40,6 +41,7 @@ from hippodrome.core.views.sequence import Step
 __all__ = ["Localizer", "LocalizerConfig", "localize"]
 
 LANE_M = 3.0  # a lateral disagreement counts as at most this: a larger one comes from another place or from a bend
+UNREAD_AFTER_M = 20.0  # after this way the place in the lane that was read says little of the place in it
 NOT_MOVED = Step(0.0, 0.0)
 
 
@@ -96,6 +98,9 @@ class Localizer:
         self._since_query = NOT_MOVED  # metres and rad since the last query frame
         self._match: PlaceMatch | None = None  # what the last query frame showed
         self._fix = Fix()
+        roads = self._places.roads
+        self._road = RoadSense(roads, config.camera) if config.road_reading and roads is not None else None
+        self._since_frame = NOT_MOVED  # metres and rad since the last frame
 
     @property
     def metres_per_unit(self) -> float:
@@ -111,7 +116,18 @@ class Localizer:
         self._predict(observation)
         if observation.frame is not None and (self._match is None or keyframes.is_due(self._view_change, self._config.steps)):
             self._query(observation.frame)
+        if observation.frame is not None and self._road is not None:
+            self._read_road(observation.frame, self._road)
         return self._estimate(observation.t_s)
+
+    def _read_road(self, frame: Frame, road: RoadSense) -> None:
+        """Update the belief with what the road ahead tells, once there is a fix that nothing challenges."""
+        since, self._since_frame, belief = self._since_frame, NOT_MOVED, self._belief
+        if not self._fix.adopted or not competes(belief) or belief.challenged:
+            return
+        measurement = road.measure(frame, since.length, since.turn_rad, belief.pose, belief.covariance)
+        if measurement is not None:
+            self._belief = belief.inject(measurement)
 
     def _predict(self, observation: Observation) -> None:
         """Move the belief by the observed self-motion, with the gyro noise that the signal itself shows."""
@@ -123,6 +139,9 @@ class Localizer:
         self._belief = self._belief.predict(Motion(travelled, turned_rad, observation.dt_s, walk))
         travelled_m = travelled * math.exp(self._belief.log_scale)
         self._since_query = Step(self._since_query.length + travelled_m, self._since_query.turn_rad + turned_rad)
+        if self._road is not None:
+            self._road.move(travelled_m)
+            self._since_frame = Step(self._since_frame.length + travelled_m, self._since_frame.turn_rad + turned_rad)
 
     def _query(self, frame: Frame) -> None:
         """Recognise the place that a query frame shows, and update belief and fix with it.
@@ -155,6 +174,8 @@ class Localizer:
         """
         noise, pose = self._config.injection, self._recogniser.pose(match)
         along_m = LINK_REACH_M if self._places.at_end[match.cell] else noise.along_m
+        if self._road is not None:
+            along_m *= self._road.distrust()
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         return PoseMeasurement(pose, turn @ np.diag([along_m**2, noise.across_m**2, noise.heading_rad**2]) @ turn.T)
@@ -221,7 +242,8 @@ class Localizer:
         other arises where a drifting heading pulls the pose aside: it is measured by how far views and belief disagree laterally.
         """
         left = np.array([-math.sin(heading_rad), math.cos(heading_rad), 0.0])
-        return (self._config.injection.wander_m**2 + self._fix.sq_lateral_m2) * np.outer(left, left)
+        unread = 1.0 if self._road is None else 1.0 - math.exp(-self._road.since_m / UNREAD_AFTER_M)
+        return unread * (self._config.injection.wander_m**2 + self._fix.sq_lateral_m2) * np.outer(left, left)
 
 
 def _sq_lateral_m2(believed: FloatArray, measured: FloatArray) -> float:

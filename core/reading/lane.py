@@ -110,6 +110,11 @@ def place_in_lane(
     return Place(middle, variance, width, chosen[0], chosen[1], {side: odds[k, side] for k, side in sides})
 
 
+def edge_probability(place: Place, side: int) -> float:
+    """Probability that the border on a side (1 left, -1 right) is the road's edge; nan where it is not seen."""
+    return 1.0 / (1.0 + math.exp(-place.edges[side])) if side in place.edges else math.nan
+
+
 def heading_variance_rad2(lines: Lines) -> float:
     """Variance of the direction of the lane where the rear axle is."""
     own = GRADE**2 * float(lines.covariance[0, 0])

@@ -12,7 +12,7 @@ from hippodrome.core.reading.arcs import GRADE, best_arc, fit_arc, line_places
 from hippodrome.core.reading.config import ReaderConfig
 from hippodrome.core.reading.ends import stop_line, strip_levels
 from hippodrome.core.reading.ground import Ground, ground_of
-from hippodrome.core.reading.lane import Lines, Place, beside_the_axle, heading_variance_rad2, place_in_lane
+from hippodrome.core.reading.lane import Lines, Place, beside_the_axle, edge_probability, heading_variance_rad2, place_in_lane
 from hippodrome.core.reading.memory import Memory
 from hippodrome.core.reading.mouth import line_end
 from hippodrome.core.reading.ridges import find_ridges, trust_of
@@ -71,6 +71,9 @@ class RoadReader:
             curvature_1pm=float(lines.arc[1]),
             curvature_variance_1pm2=GRADE**2 * float(lines.covariance[1, 1]),
             lane_width_m=place.width_m,
+            curvature_change_1pm2=float(lines.arc[2]),
+            left_edge=edge_probability(place, 1),
+            right_edge=edge_probability(place, -1),
         )
 
     def _ground_of(self, frame: Frame) -> Ground:

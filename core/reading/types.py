@@ -23,6 +23,9 @@ class RoadReading:
         offset_m: of the rear axle from the middle of its lane, left positive.
         heading_rad: of the vehicle against the lane where the rear axle is, counter-clockwise positive.
         curvature_1pm: of the lane, left positive.
+        curvature_change_1pm2: of the curvature along the lane.
+        left_edge, right_edge: probability that the border on this side is the edge of the road, with no lane beyond; nan where
+            the border is not seen.
         lane_width_m: between the borders; nan if only one of them was seen.
         end_m: from the rear axle along the lane to the stop line or the junction's mouth.
         end: which of the two.
@@ -38,6 +41,9 @@ class RoadReading:
     end_m: float = math.nan
     end_variance_m2: float = math.inf
     end: LaneEnd = LaneEnd.NOTHING
+    curvature_change_1pm2: float = 0.0
+    left_edge: float = math.nan
+    right_edge: float = math.nan
 
     @property
     def sees_lane(self) -> bool:

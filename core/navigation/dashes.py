@@ -1,8 +1,8 @@
 """The metres that were driven, seen on the dashes of the road's centre line: before any view tells the scale of the odometry.
 
-The centre line is sampled along the ground in two frames. What moved past between them is the shift at which the two rows of levels
-agree best. Dashes are 3 m and more long and farther apart than that, so a shift of a few metres is told without doubt; where the
-line has no dash, or the road none, nothing is told.
+The centre line is sampled along the ground in two frames. What moved past between them is the shift at which the two rows of
+levels agree best. Dashes are 3 m and more long and farther apart than that, so a shift of a few metres is told without doubt;
+where the line has no dash, or the road no line, nothing is told.
 """
 
 from __future__ import annotations

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 from hippodrome.core.navigation.config import DriveConfig, VehicleShape
 from hippodrome.core.navigation.course import Course, at, next_gate
-from hippodrome.core.navigation.junctions import SIGHT_M, gate_speed_mps
+from hippodrome.core.navigation.junctions import SIGHT_M, gate_speed_mps, is_barred
 from hippodrome.core.navigation.speed import stopping_mps
 from hippodrome.core.navigation.types import Indicator, Radar
 
 LOOK_S = 0.4  # braking begins so early: the speed follows the wanted one with a lag
 GOAL_BRAKING_MPS2 = 1.2  # gentle, since the last metre counts
 CHANGE_INDICATED_M = 25.0  # before a lane change
+BARRED = "waits: somebody stands beyond the junction"
 SLOWEST_MPS = 2.5  # however unsure the place: a vehicle that stands learns nothing of it
 
 
@@ -47,6 +48,8 @@ def pace(
         if to_stop_m < SIGHT_M:
             indicator = gate.indicator
         slowed, why = gate_speed_mps(to_stop_m, speed_mps, radar, config)
+        if gate.indicator is Indicator.STRAIGHT and is_barred(to_stop_m, speed_mps, radar):
+            slowed, why = stopping_mps(to_stop_m, config.braking_mps2), BARRED
         stop_m = min(stop_m, to_stop_m) if math.isfinite(slowed) else stop_m
         if slowed < wanted:
             wanted, reason = slowed, why

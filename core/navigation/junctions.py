@@ -9,6 +9,8 @@ from hippodrome.core.navigation.speed import can_stop, stopping_mps
 from hippodrome.core.navigation.types import Lamp, Radar
 
 SIGHT_M = 30.0  # a junction farther away does not matter yet
+BEYOND_M = (4.0, 60.0)  # beyond the line where one is to stop
+STANDS_MPS = 0.4  # a radar's noise is a quarter of that
 PASSED_M = 1.6  # whose bumper is so far beyond the line is in the junction, and leaves it
 
 
@@ -30,3 +32,9 @@ def gate_speed_mps(to_stop_m: float, speed_mps: float, radar: Radar, config: Dri
     if not radar.way_is_free and can_stop(to_stop_m + 0.5 * PASSED_M, speed_mps, config.firm_braking_mps2):
         return stopping_mps(to_stop_m, config.braking_mps2), "gives way"
     return math.inf, ""
+
+
+def is_barred(to_stop_m: float, speed_mps: float, radar: Radar) -> bool:
+    """Whether somebody stands beyond the junction ahead, on the way straight on: one waits before it, and not in it."""
+    beyond = to_stop_m + BEYOND_M[0] < radar.gap_m < to_stop_m + BEYOND_M[1]
+    return not radar.blind and 0.0 < to_stop_m < SIGHT_M and beyond and abs(speed_mps - radar.closing_mps) < STANDS_MPS

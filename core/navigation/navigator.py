@@ -1,7 +1,7 @@
 """The navigator: from what the vehicle senses to what it does, on its own map and to a goal, from an unknown start.
 
-Each step passes through it from top to bottom: the sensors are watched, the localizer is asked, the lane is read, the pose that is
-steered by is corrected, and then one of the states of ``DrivingState`` decides:
+Each step passes through it from top to bottom: the sensors are watched, the localizer is asked, the lane is read, the pose that
+is steered by is corrected, and then one of the states of ``DrivingState`` decides:
 
     SEARCHING  no fix: on sight along the border of the own side (``searching``), until the localizer knows the place
     DRIVING    on the course of the plan (``pilot``, ``driving``, ``steering``)
@@ -23,9 +23,9 @@ from hippodrome.core.localization.localizer import Localizer
 from hippodrome.core.navigation import motion as motions
 from hippodrome.core.navigation import track as tracks
 from hippodrome.core.navigation.config import NavigatorConfig
-from hippodrome.core.navigation.course import offset_and_turn, path_poses
+from hippodrome.core.navigation.course import at, offset_and_turn, path_poses
 from hippodrome.core.navigation.dashes import LEAST_M, MOST_M, LineView, driven_m, line_levels
-from hippodrome.core.navigation.driving import pace
+from hippodrome.core.navigation.driving import BARRED, pace
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
 from hippodrome.core.navigation.placing import keeps_left, lane_of, lane_that_is_read
 from hippodrome.core.navigation.searching import LaneMemory, remembered, search_step
@@ -56,6 +56,7 @@ AHEAD_M, HALF_BODY_M = (5.0, 13.0), 0.7  # of the path ahead, which must not lea
 OFF_ROAD, OFF_ROAD_FRAMES = 0.3, 3  # share of it that is seen to be no road, in so many frames: the place is wrong ..
 LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehicle may be so much farther on, or less far
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
+SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 CREEP_AFTER_S = 4.0  # stood without a road ahead and with nobody there, one creeps on
 BEGINS_M = 5.0  # so far the ground beside the vehicle has not been seen yet
@@ -308,7 +309,8 @@ class Navigator:
         if gate is None or gate.indicator is not near_turn or not gate.entry_u_m - 1.0 < plan.u_m < gate.exit_u_m + 1.0:
             return
         border_m = self._ground.border_m(self._side)
-        if math.isfinite(border_m):
+        bend = at(plan.course.path.curvature_1pm, plan.u_m), at(plan.course.path.curvature_1pm, plan.u_m + SHARP_M)
+        if math.isfinite(border_m) and max(map(abs, bend)) < SHARP_1PM:  # sharp corners are cut on purpose
             offset_m, turn_rad = offset_and_turn(plan.course, track.pose, plan.u_m)
             seen_m = self._side * (self._memory.beside_m - border_m)
             heading = float(track.pose[2]) - turn_rad
@@ -330,7 +332,7 @@ class Navigator:
                 slowed = HOLD_MPS2
             state = DrivingState.HALTED if halt else DrivingState.DOUBTING
             command = replace(command, acceleration_mps2=max(slowed, -3.0), state=state, reason=complaint)
-        self._look_for_blockage(radar, dt_s)
+        self._look_for_blockage(radar, command.reason == BARRED, dt_s)
         return command
 
     def _keep_plan(self) -> None:
@@ -403,9 +405,9 @@ class Navigator:
             self._plan = self._planner.plan(self._track.pose, 0.0, beyond_goal=True)
         return self._standing(DrivingState.DOUBTING, "cannot vouch for the goal's place")
 
-    def _look_for_blockage(self, radar: Radar, dt_s: float) -> None:
+    def _look_for_blockage(self, radar: Radar, barred: bool, dt_s: float) -> None:
         """A road counts as closed where the vehicle has stood long before something, though no lamp is red."""
-        waits = radar.gap_m < OBSTACLE_M and radar.lamp not in (Lamp.RED, Lamp.YELLOW) and not radar.blind
+        waits = (barred or radar.gap_m < OBSTACLE_M) and radar.lamp not in (Lamp.RED, Lamp.YELLOW) and not radar.blind
         standing = self._motion.speed_mps < STANDING_MPS
         self._standing_s = self._standing_s + dt_s if standing and waits else 0.0
         if self._plan is None or self._track is None or self._standing_s < self._config.drive.blocked_s:

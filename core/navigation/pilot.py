@@ -57,8 +57,8 @@ class RoutePlanner:
         place = lane_of(self.roads, pose)
         if place is None or abs(place.offset_m) > GOAL_REACH_M:
             raise HippodromeError(
-                f"goal x={goal.x_m:.1f} m, y={goal.y_m:.1f} m, heading {goal.heading_rad:.2f} rad: no lane of this direction lies "
-                f"within {GOAL_REACH_M:g} m; give the place and the direction of a lane"
+                f"goal x={goal.x_m:.1f} m, y={goal.y_m:.1f} m, heading {goal.heading_rad:.2f} rad: no lane of this direction "
+                f"lies within {GOAL_REACH_M:g} m; give the place and the direction of a lane"
             )
         self._goal, self.closed = place, frozenset()
         self._search()

@@ -61,7 +61,7 @@ def lane_that_is_read(roads: RoadGeometry, pose: FloatArray, place: LanePlace, r
 def keeps_left(roads: RoadGeometry) -> bool:
     """Whether traffic keeps left: beside most lanes, the lane of the opposite direction lies to the right."""
     network = roads.network
-    lanes = np.flatnonzero(~network.is_internal)
+    lanes = np.flatnonzero(~network.is_internal).astype(np.int32)
     middle = poses_on_segments(roads, lanes, 0.5 * roads.lane_length_m[lanes])
     near = project(roads, middle[:, :2], 5.0)
     opposite = np.abs(wrap(near.heading_rad - middle[near.point, 2])) > math.pi - 0.5

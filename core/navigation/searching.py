@@ -96,10 +96,13 @@ class SearchStep:
 
 
 def search_step(
-    ground: Ground, memory: LaneMemory, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float, bend_1pm: float, straight_on: bool, begins: bool,
-    config: DriveConfig, vehicle: VehicleShape,
+    ground: Ground, memory: LaneMemory, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float,
+    bend_1pm: float, straight_on: bool, begins: bool, config: DriveConfig, vehicle: VehicleShape,
 ) -> SearchStep:  # fmt: skip
-    """The next step along the border on the own ``side``: -1 right, +1 left; ``bend_1pm`` is what the vehicle drives now."""
+    """The next step along the border on the own ``side``: -1 right, +1 left; ``bend_1pm`` is what the vehicle drives now.
+
+    ``straight_on`` passes side streets; with ``begins`` the ground beside the vehicle has not been seen yet.
+    """
     way = ground.way(bend_1pm, side, KERB_M, straight_on, LOOK_M)
     bends, turned = way.curvature_1pm, way.heading_rad - way.heading_rad[0]
     near = min(int(PREVIEW_S * speed_mps / STEP_M), len(bends) - 1)
@@ -128,7 +131,7 @@ def search_step(
     return SearchStep(curvature, wanted, indicated(float(turned[-1])), reason, may_creep)
 
 
-def _to_stop_m(turned_rad: np.ndarray, reading: RoadReading | None, vehicle: VehicleShape) -> float:  # type: ignore[type-arg]
+def _to_stop_m(turned_rad: np.ndarray, reading: RoadReading | None, vehicle: VehicleShape) -> float:
     """How far the bumper may go before the junction ahead, if one is seen: up to the stop line, or to where the border turns."""
     if reading is not None and reading.end is not LaneEnd.NOTHING and math.isfinite(reading.end_m):
         return reading.end_m - vehicle.front_m - 0.3

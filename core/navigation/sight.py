@@ -2,9 +2,9 @@
 
 A driver who does not know the place keeps to the border on the own side of the road: along the street it is the edge line, at a
 junction it leads round the corner into the next street. So the vehicle keeps to its lane, never meets oncoming traffic, and comes
-round the block. The border lies below the camera's view where the vehicle is beside it, hence a map of the ground around the vehicle,
-built from the frames and moved with dead reckoning (an occupancy grid: Elfes, "Using occupancy grids for mobile robot perception
-and navigation", Computer 22, 1989).
+round the block. The border lies below the camera's view where the vehicle is beside it, hence a map of the ground around the
+vehicle, built from the frames and moved with dead reckoning (an occupancy grid: Elfes, "Using occupancy grids for mobile robot
+perception and navigation", Computer 22, 1989).
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class GroundView:
 def ground_view(camera: CameraGeometry, width_px: int, height_px: int) -> GroundView:
     """The ground that a level camera sees up to ``FAR_M``."""
     focal = camera.focal_px(width_px)
-    first = int(math.ceil(0.5 * (height_px - 1) + focal * camera.height_m / FAR_M))
+    first = math.ceil(0.5 * (height_px - 1) + focal * camera.height_m / FAR_M)
     below = np.arange(first, height_px) - 0.5 * (height_px - 1)
     depth = focal * camera.height_m / np.maximum(below, 1e-3)
     across = (np.arange(width_px) - 0.5 * (width_px - 1)) / focal
@@ -152,7 +152,7 @@ class Ground:
         return Way(rows[:, 0], rows[:, 1], rows[:, 2], free_m)
 
     def border_m(self, side: float) -> float:
-        """Distance from the vehicle's line of travel to the border on one side, a little ahead of the rear axle; nan if unknown."""
+        """Distance from the vehicle's line of travel to the border on one side, just ahead of the rear axle; nan if unknown."""
         x, y = self.pose[0] + NEAR_M * math.cos(self.pose[2]), self.pose[1] + NEAR_M * math.sin(self.pose[2])
         found = float(_border_m(self._cells, self._origin_m, x, y, self.pose[2], side))
         return found if 0.0 <= found < REACH_M else math.nan
@@ -198,7 +198,7 @@ def _enter(
     index = np.empty((n, 2), dtype=np.int64)
     for k in range(n):
         x, y = pose[0] + cos * ahead[k] - sin * left[k], pose[1] + sin * ahead[k] + cos * left[k]
-        i, j = int(math.floor((x - origin[0]) / CELL_M)), int(math.floor((y - origin[1]) / CELL_M))
+        i, j = math.floor((x - origin[0]) / CELL_M), math.floor((y - origin[1]) / CELL_M)
         index[k, 0], index[k, 1] = (i, j) if 0 <= i < CELLS and 0 <= j < CELLS else (-1, -1)
         if index[k, 0] >= 0:
             cells[i, j] = UNKNOWN
@@ -210,7 +210,7 @@ def _enter(
 
 @njit(cache=True)
 def _kind_at(cells: UInt8Array, origin: FloatArray, x: float, y: float) -> int:
-    i, j = int(math.floor((x - origin[0]) / CELL_M)), int(math.floor((y - origin[1]) / CELL_M))
+    i, j = math.floor((x - origin[0]) / CELL_M), math.floor((y - origin[1]) / CELL_M)
     if i < 0 or j < 0 or i >= CELLS or j >= CELLS:
         return UNKNOWN
     return int(cells[i, j])
@@ -258,8 +258,8 @@ def _along_border(
 ) -> FloatArray:
     """The way: rows (count, 4) of curvature, heading, whether the border was seen, and the distance to what is no road.
 
-    The vehicle's law of steering (Samson) acts on the line of equal distance from the border: round a sharp corner that line is an
-    arc, and where the road bends away the border comes nearer ahead.
+    The vehicle's law of steering (Samson) acts on the line of equal distance from the border: round a sharp corner that line is
+    an arc, and where the road bends away the border comes nearer ahead.
     """
     rows = np.zeros((count, 4))
     x, y, heading = pose[0], pose[1], pose[2]

@@ -73,7 +73,7 @@ def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Tr
     noise = covariance + _turned(float(pose[2]), LOCALIZED_M[0] ** 2, LOCALIZED_M[1] ** 2, LOCALIZED_RAD**2)
     difference = pose - track.pose
     difference[2] = wrap_compiled(difference[2])
-    gain = np.linalg.solve((track.covariance + noise).T, track.covariance.T).T
+    gain: FloatArray = np.linalg.solve((track.covariance + noise).T, track.covariance.T).T
     return _shifted(track, gain @ difference, gain, np.eye(3), noise)
 
 
@@ -167,4 +167,5 @@ def _turned(heading_rad: float, sq_along: float, sq_across: float, sq_heading: f
     """A covariance (3, 3) given along and across a heading."""
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    return turn @ np.diag([sq_along, sq_across, sq_heading]) @ turn.T
+    rotated: FloatArray = turn @ np.diag([sq_along, sq_across, sq_heading]) @ turn.T
+    return rotated

@@ -46,9 +46,9 @@ def add_mission_command(commands: Any) -> None:
     )
     parser.add_argument(
         "--rows", nargs="+", choices=ROW_KEYS, default=["ours", "truth"], metavar="ROW",
-        help="who drives. ours: from an unknown start; truth: the same, told its true pose (the upper bound); dead-reckoning: told "
-             "the true start, and nothing later (the lower bound); no-reading: without the lane read from the frames; paper, kalman: "
-             "with these modes of the localizer (default: ours truth)",
+        help="who drives. ours: from an unknown start; truth: the same, told its true pose (the upper bound); dead-reckoning: "
+             "told the true start, and nothing later (the lower bound); no-reading: without the lane read from the frames; "
+             "paper, kalman: with these modes of the localizer (default: ours truth)",
     )  # fmt: skip
     parser.add_argument(
         "--film", action="store_true",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -37,13 +37,14 @@ class Film:
         self._lanes = [world.network.lane_points_m(k) for k in range(world.network.lane_count)]
         self._goal_m = np.array(pose_of(world.network, mission.goal_lane, mission.goal_m)[:2])
         self._pictures: list[Image.Image] = []
-        self._camera = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
+        self._camera: Frame = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         self._steps = 0
 
     def look(self, sensed: Sensed, navigator: Navigator) -> None:
         """Take a step in; every few of them make a picture."""
         if sensed.observation.frame is not None:
-            self._camera = cv2.resize(_coloured(sensed.observation.frame), SIZE, interpolation=cv2.INTER_NEAREST)
+            shown = cv2.resize(_coloured(sensed.observation.frame), SIZE, interpolation=cv2.INTER_NEAREST)
+            self._camera = np.asarray(shown, dtype=np.uint8)
         if self._steps % EVERY_STEPS == 0 and len(self._pictures) < MOST:
             self._pictures.append(Image.fromarray(np.hstack([self._camera, self._from_above(sensed, navigator)])))
         self._steps += 1
@@ -60,7 +61,7 @@ class Film:
         picture = np.full((SIZE[1], SIZE[0], 3), 245, dtype=np.uint8)
         scale = SIZE[0] / VIEW_M
 
-        def drawn(points_m: FloatArray) -> np.ndarray:  # type: ignore[type-arg]
+        def drawn(points_m: FloatArray) -> Any:
             shifted = (np.atleast_2d(points_m)[:, :2] - middle) * np.array([scale, -scale]) + 0.5 * np.array(SIZE)
             return np.rint(np.clip(shifted, -2000, 2000)).astype(np.int32).reshape(-1, 1, 2)
 
@@ -95,7 +96,7 @@ def _ellipse_m(pose: FloatArray, covariance: FloatArray) -> FloatArray:
     return ring
 
 
-def _box(picture: Frame, drawn, pose: FloatArray, colour: tuple[int, int, int], reach_m: tuple[float, float]) -> None:  # type: ignore[no-untyped-def]
+def _box(picture: Frame, drawn: Any, pose: FloatArray, colour: tuple[int, int, int], reach_m: tuple[float, float]) -> None:
     """A vehicle: from ``reach_m[0]`` to ``reach_m[1]`` along its heading, 1.8 m wide."""
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     corners = np.array([(x, y) for x, y in ((reach_m[0], 0.9), (reach_m[1], 0.9), (reach_m[1], -0.9), (reach_m[0], -0.9))])

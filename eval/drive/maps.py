@@ -22,7 +22,6 @@ from hippodrome.sim.record import RecordingPlan, finish
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.survey import with_survey_error
 
-
 MAP_CODE: Final = (  # all code that a map comes from, beside that of its recording: who drives on it changes no map
     "core/*.py",
     *(f"core/{room}/**/*.py" for room in ("attractors", "mapping", "matching", "refinement", "roads", "solvers", "views")),

@@ -1,4 +1,4 @@
-"""The page of a run, ``drive.html``: for each town the driven ways on the map of its roads, and the missions with their causes."""
+"""The page of a run, ``drive.html``: for each town the driven ways on its roads, and the missions with their causes."""
 
 from __future__ import annotations
 

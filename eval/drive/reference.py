@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import libsumo
@@ -16,6 +17,7 @@ from hippodrome.sim.traffic import vehicle_types_xml
 
 LONGEST_S: Final = 600.0
 STANDING_MPS: Final = 0.1
+FOREVER_S: Final = 1e6
 
 
 def reference_time_s(world: World, mission: Mission) -> float | None:
@@ -36,12 +38,14 @@ def reference_time_s(world: World, mission: Mission) -> float | None:
                 others.refill(ego_on_road=False)
             libsumo.simulationStep()
         try:
-            return _driven_s(mission, others)
+            return _driven_s(mission, others, drive.closed)
         except libsumo.TraCIException:  # no route, or a goal too close to where a lane begins to stop there
             return None
 
 
-def _driven_s(mission: Mission, others: BackgroundTraffic) -> float | None:
+def _driven_s(mission: Mission, others: BackgroundTraffic, closed: Sequence[str]) -> float | None:
+    for name in closed:
+        libsumo.edge.adaptTraveltime(name, FOREVER_S)  # SUMO's driver knows what is closed
     start, goal = (lane.rpartition("_") for lane in (mission.start_lane, mission.goal_lane))
     route = libsumo.simulation.findRoute(start[0], goal[0], "ego")
     libsumo.route.add("reference", route.edges)

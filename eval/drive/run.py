@@ -117,7 +117,10 @@ def missions_of(scenario: Scenario, map_file: Path, out: Path, count: int) -> li
     """The missions of a scenario, drawn by its seed."""
     town = RecordingPlan(scenario, "mapping", out).town()
     mapped = mapped_lanes(surveyed(scenario, out), read_map(map_file), PlanConfig().mapped_within_m)
-    return draw_missions(town.network, mapped, scenario.seed, count, frozenset())
+    closed = frozenset(
+        town.network.edge_ids.index(name) for name in scenario.localization.closed if name in town.network.edge_ids
+    )
+    return draw_missions(town.network, mapped, scenario.seed, count, closed)
 
 
 def run_mission(task: MissionTask) -> dict[str, Any]:
@@ -158,7 +161,7 @@ def _flight(task: MissionTask, world: World) -> Flight:
 @lru_cache(maxsize=1)
 def _world(scenario: Scenario, out: Path) -> World:
     """The process's one world: missions of one town share it."""
-    return World(scenario, out)
+    return World(scenario, out, closed=scenario.localization.closed)
 
 
 def _kept(file: Path) -> dict[str, Any] | None:
@@ -188,7 +191,7 @@ def _scenario_result(
         own = [one for task, one in mine if task.row == row]
         simulated_s, cpu_s = sum(one["figures"]["time_s"] for one in own), sum(one["cpu_s"] for one in own)
         factor = round(simulated_s / cpu_s, DECIMALS) if cpu_s > 0.0 else None
-        made.append(Row(method=row.label, drive=row_result([one["figures"] for one in own], factor)))  # type: ignore[call-arg]
+        made.append(Row(method=row.label, drive=row_result([one["figures"] for one in own], factor)))
     town = RecordingPlan(scenario, "mapping", out).town()
     edges = len(town.network.edge_ids)
     lengths = town.network.lane_lengths_m()[~town.network.is_internal]

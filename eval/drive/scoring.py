@@ -1,7 +1,7 @@
 """What a mission scores, and what a row of missions does. Every figure's definition stands beside it, in ``DEFINITIONS``.
 
-Success weighted by path length (SPL): Anderson et al., "On evaluation of embodied navigation agents" (2018). Driving score: that of
-the CARLA leaderboard, completion times a penalty for each infraction, with the coefficients of its version 2.0 where it has the
+Success weighted by path length (SPL): Anderson et al., "On evaluation of embodied navigation agents" (2018). Driving score: that
+of the CARLA leaderboard, completion times a penalty for each infraction, with the coefficients of its version 2.0 where it has
 infraction, and those of a red light for a right of way, of an obstacle for a kerb.
 """
 
@@ -36,8 +36,8 @@ DEFINITIONS: Final = {
     "success_rate_mapped": "the same, goals on streets that the map knows",
     "success_rate_unmapped": "the same, goals on streets that the map does not know",
     "spl": "mean of success x shortest way / max(driven, shortest way), Anderson et al. 2018",
-    "driving_score": "mean of completion x product of penalties (CARLA leaderboard 2.0: vehicle .60, static or kerb .65, red light .70, "
-    "right of way .70), of 100",
+    "driving_score": "mean of completion x product of penalties, of 100 (CARLA leaderboard 2.0: vehicle .60, static or kerb .65, "
+    "red light .70, right of way .70)",
     "collisions_at_fault": "collisions with vehicles that were the ego's fault, in all missions",
     "wrong_way": "times that the ego drove against its lane's direction",
     "false_arrivals": "times that an arrival was said elsewhere than at the goal",

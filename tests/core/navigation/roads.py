@@ -1,6 +1,7 @@
 """A block of one-way streets with lanes through its junctions, a bicycle that drives there, and a pose source that knows all."""
 
 import math
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -68,7 +69,7 @@ def map_along(network):
     poses = []
     for lane in range(network.lane_count):
         points = network.lane_points_m(lane)
-        for a, b in zip(points[:-1], points[1:], strict=True):
+        for a, b in pairwise(points):
             step = b - a
             for share in np.arange(0.0, 1.0, 2.0 / max(np.hypot(*step), 2.0)):
                 poses.append([*(a + share * step), math.atan2(step[1], step[0])])

@@ -119,7 +119,9 @@ def test_what_a_wrong_scale_does_grows_with_the_way_and_goes_into_the_next_stree
     track = tracks.begun(np.zeros(3), np.diag([1e-4, 1e-4, 1e-6]))
     for _ in range(100):
         track = tracks.moved(track, 1.0, 0.0)
-    assert track.along_sigma_m == pytest.approx(math.hypot(100 * tracks.SCALE_SIGMA, math.sqrt(100 * tracks.ALONG_PER_M)), rel=0.05)
+    assert track.along_sigma_m == pytest.approx(
+        math.hypot(100 * tracks.SCALE_SIGMA, math.sqrt(100 * tracks.ALONG_PER_M)), rel=0.05
+    )
     turned = tracks.moved(track, 0.01, 0.5 * math.pi)
     reading = RoadReading(offset_m=0.0, offset_variance_m2=0.01)
     known = tracks.with_lane(turned, reading, turned.pose[:2], 0.5 * math.pi)[0]

@@ -43,7 +43,11 @@ def test_a_mission_is_driven_kept_and_made_anew_with_the_same_bytes(request_of, 
     assert row["false_arrivals"] == 0 and row["wrong_way"] == 0
     assert "<svg" in (out / "drive.html").read_text()
     (file,) = (out / "hamlet" / "missions").glob("*.json")
-    first, trace, written = json.loads(file.read_text())["figures"], np.load(file.with_suffix(".npz"))["trace"], file.stat().st_mtime_ns
+    first, trace, written = (
+        json.loads(file.read_text())["figures"],
+        np.load(file.with_suffix(".npz"))["trace"],
+        file.stat().st_mtime_ns,
+    )
     drive(request_of)
     assert file.stat().st_mtime_ns == written
     file.unlink()

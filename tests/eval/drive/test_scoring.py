@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from hippodrome.core.navigation.types import DrivingState
+from hippodrome.core.types import HippodromeError
 from hippodrome.eval.drive.flight import TRACE, Flight
 from hippodrome.eval.drive.missions import Mission, draw_missions
 from hippodrome.eval.drive.rows import ROWS, row_named
 from hippodrome.eval.drive.scoring import DEFINITIONS, mission_result, row_result
 from hippodrome.eval.drive.table import table_lines
 from hippodrome.eval.results.model import Network, Results, Row, ScenarioResult
-from hippodrome.core.types import HippodromeError
 from hippodrome.sim.loop.types import Event, EventKind
 from tests.core.synthetic import grid_network, lanes_of
 
@@ -81,7 +81,9 @@ def test_the_table_fits_a_terminal():
     drive = row_result([mission_result(MISSION, flight(), NETWORK, 20.0)], 12.0)
     place = Network(path=None, generator="grid", edges=2, km=0.2)
     rows = tuple(Row(method=row.label, drive=drive) for row in ROWS)
-    results = Results(scenarios=(ScenarioResult(name="x" * 60, seed=1, network=place, noise="paper", frames=0, duration_s=0.0, rows=rows),))
+    results = Results(
+        scenarios=(ScenarioResult(name="x" * 60, seed=1, network=place, noise="paper", frames=0, duration_s=0.0, rows=rows),)
+    )
     assert max(map(len, table_lines(results))) <= 80
 
 

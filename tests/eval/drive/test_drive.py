@@ -1,6 +1,7 @@
 """A tiny town from its mapping drive to a mission's figures; what is done is kept, and made anew it has the same bytes."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,6 +52,7 @@ def test_a_mission_is_driven_kept_and_made_anew_with_the_same_bytes(request_of, 
     drive(request_of)
     assert file.stat().st_mtime_ns == written
     file.unlink()
-    drive(request_of)
+    drive(replace(request_of, film=True))
+    assert file.with_suffix(".webp").stat().st_size > 10_000
     assert json.loads(file.read_text())["figures"] == first
     assert np.array_equal(np.load(file.with_suffix(".npz"))["trace"], trace, equal_nan=True)

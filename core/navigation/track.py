@@ -73,7 +73,7 @@ def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Tr
     noise = covariance + _turned(float(pose[2]), LOCALIZED_M[0] ** 2, LOCALIZED_M[1] ** 2, LOCALIZED_RAD**2)
     difference = pose - track.pose
     difference[2] = wrap_compiled(difference[2])
-    gain: FloatArray = np.linalg.solve((track.covariance + noise).T, track.covariance.T).T
+    gain = np.asarray(np.linalg.solve((track.covariance + noise).T, track.covariance.T).T, dtype=np.float64)
     return _shifted(track, gain @ difference, gain, np.eye(3), noise)
 
 

@@ -33,7 +33,7 @@ CORE_ROOMS = {
     "matching": {"matching/search", "roads"},
     "refinement": {"matching", "matching/hmm", "matching/search", "roads", "solvers"},
     "localization/beliefs": {"attractors", "roads"},
-    "localization": {"localization/beliefs", "roads", "views"},
+    "localization": {"localization/beliefs", "reading", "roads", "views"},
     "reading": {"views/egomotion"},
     "navigation": {"localization", "localization/beliefs", "reading", "roads", "views"},
 }

@@ -44,11 +44,12 @@ def in_lane(x, y, offset_m, heading_rad, curvature_1pm):
 
 def road(
     view, size=(160, 120), offset_m=0.0, heading_rad=0.0, curvature_1pm=0.0, lines=((-1.4, 0), (1.6, 9), (4.6, 0)),
-    bars=(), end_m=np.inf, noise=0.0, asphalt=ASPHALT, paint=PAINT,
+    bars=(), end_m=np.inf, noise=0.0, along_m=0.0, asphalt=ASPHALT, paint=PAINT,
 ):  # fmt: skip
     """An RGB frame. ``lines`` are places left of the lane's middle with the period of their dashes of 3 m (0: solid).
 
-    ``bars`` are (first, last) metres along the lane that are painted across it; lines and verges end at ``end_m``.
+    ``along_m`` is how far the vehicle has come, which moves the dashes. ``bars`` are (first, last)
+    metres along the lane that are painted across it; lines and verges end at ``end_m``.
     """
     x, y = ground(view, size)
     with np.errstate(invalid="ignore"):
@@ -58,7 +59,7 @@ def road(
         level = np.where(((left < right - 0.9) | (left > far + 0.9)) & (along < end_m), GRASS, level)
         for place, period in lines:
             shown = (abs(left - place) < 0.07) & (along < end_m)
-            level = np.where(shown & (((along + 5.0) % period < 3.0) if period else True), paint, level)
+            level = np.where(shown & (((along + along_m + 5.0) % period < 3.0) if period else True), paint, level)
         for first, last in bars:
             level = np.where((along > first) & (along < last) & (abs(left) < 1.5), paint, level)
     level = np.where(np.isfinite(x), level, SKY)

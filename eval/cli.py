@@ -11,6 +11,7 @@ from hippodrome.eval.commands.arguments import Command, HelpLayout, print_help
 from hippodrome.eval.commands.authoring import add_scenario_command
 from hippodrome.eval.commands.board import add_board_command
 from hippodrome.eval.commands.boundary import guarded, make_numba_cache
+from hippodrome.eval.commands.drive import add_mission_command
 from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands
 from hippodrome.eval.commands.methods import add_method_commands
@@ -74,6 +75,7 @@ def make_parser() -> argparse.ArgumentParser:
     add_board_command(commands)
     add_gate_commands(commands)
     add_drive_command(commands)
+    add_mission_command(commands)
     add_serve_command(commands)
     add_stage_commands(commands)
     add_trial_commands(commands)

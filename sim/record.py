@@ -77,7 +77,7 @@ class RecordingPlan:
             "seed": scenario.seed,
             "town": scenario.town.model_dump(mode="json", exclude={"network"}),
             "network_sha256": sha256_of(self.town().net_file),
-            "drive": self.drive_spec.model_dump(mode="json", exclude={"recording"}),
+            "drive": self.drive_spec.model_dump(mode="json", exclude={"recording", "closed"}),
             "camera": scenario.camera.model_dump(mode="json"),
             "odometry_rate_hz": scenario.odometry_rate_hz,
             "noise": scenario.self_motion_noise.model_dump(mode="json"),

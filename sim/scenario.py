@@ -33,6 +33,7 @@ class DriveSpec(Spec):
     recording: Path | None = None  # folder of a recording, as `hippodrome import` writes, in place of the simulated drive
     traffic: TrafficSpec = TrafficSpec()
     ego: EgoSpec = EgoSpec()
+    closed: tuple[str, ...] = ()  # roads, by their names in SUMO's file, on which missions meet a van across each lane
     conditions: Conditions = Conditions()
 
     @model_validator(mode="before")

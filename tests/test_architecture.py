@@ -41,7 +41,7 @@ CORE_ROOMS = {
 EVAL_ROOMS = (
     "metrics", "files", "methods", "programs", "results", "pool", "reuse", "figures", "report", "rivals/ratslam",
     "rivals/orbslam3", "rivals", "contest", "evaluate", "run", "authoring", "gate", "board", "sweep", "trials/stress",
-    "trials/robustness", "trials/rivals", "exchange/drives", "exchange/readers", "exchange/formats", "exchange", "real",
+    "trials/robustness", "trials/rivals", "drive", "exchange/drives", "exchange/readers", "exchange/formats", "exchange", "real",
     "commands", "cli",
 )  # fmt: skip
 CORE_PACKAGES = {"cv2", "numba", "numpy", "scipy"}

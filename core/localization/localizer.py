@@ -102,6 +102,11 @@ class Localizer:
         self._road = RoadSense(roads, config.camera) if config.road_reading and roads is not None else None
         self._since_frame = NOT_MOVED  # metres and rad since the last frame
 
+    @property
+    def metres_per_unit(self) -> float:
+        """How long a unit of this drive's self-motion is believed to be; what is expected beforehand, until views tell."""
+        return math.exp(self._belief.log_scale)
+
     def step(self, observation: Observation) -> LocalizationEstimate:
         """Take one observation in and return the estimate at its time.
 

@@ -15,7 +15,7 @@ from hippodrome.eval.metrics.trajectory import Score
 
 DECIMALS: Final = 6  # of every number: finer than any figure means, coarser than the rounding in which machines differ
 MAX_BYTES: Final = 64 << 20  # of a file that is read: far more than any run writes
-TIMING_FIELDS: Final = frozenset({"cpu_percent", "peak_rss_bytes", "initial_time_ms", "latency_ms", "timings"})
+TIMING_FIELDS: Final = frozenset({"cpu_percent", "peak_rss_bytes", "initial_time_ms", "latency_ms", "timings", "realtime_factor"})
 
 
 class ResultsError(HippodromeError):

@@ -9,16 +9,8 @@ import numpy as np
 
 from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
-from hippodrome.sim.ego import (
-    LENGTH_M,
-    MAX_ACCEL_MPS2,
-    MAX_BRAKE_MPS2,
-    MAX_STEERING_RAD,
-    MAX_STEERING_RATE_RADPS,
-    REAR_AXLE_TO_FRONT_M,
-    WHEELBASE_M,
-    EgoCar,
-)
+from hippodrome.sim.ego import MAX_ACCEL_MPS2, MAX_BRAKE_MPS2, MAX_STEERING_RAD, MAX_STEERING_RATE_RADPS, EgoCar
+from hippodrome.sim.ego_spec import LENGTH_M, REAR_AXLE_TO_FRONT_M, WHEELBASE_M
 
 WIDTH_M: Final = 1.8  # a compact car, as SUMO is told
 WHEEL_ASIDE_M: Final = 0.8  # from the middle to the outer face of a tyre

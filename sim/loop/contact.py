@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from hippodrome.core.types import FloatArray, IntArray
-from hippodrome.sim.ego import LENGTH_M
+from hippodrome.sim.ego_spec import LENGTH_M
 from hippodrome.sim.loop.car import CENTRE_AHEAD_M, WIDTH_M, ahead_of
 from hippodrome.sim.loop.users import Users
 

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M, WHEELBASE_M
+from hippodrome.sim.ego_spec import REAR_AXLE_TO_FRONT_M, WHEELBASE_M
 from hippodrome.sim.loop.car import CENTRE_AHEAD_M, ahead_of, wheels_m
 from hippodrome.sim.loop.ground import Ground, Near
 

@@ -10,7 +10,7 @@ from typing import Final
 import libsumo
 import numpy as np
 
-from hippodrome.sim.ego import LENGTH_M
+from hippodrome.sim.ego_spec import LENGTH_M
 from hippodrome.sim.loop.rights import Rights
 from hippodrome.sim.loop.users import Users
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hippodrome.core.navigation.types import Lamp, Radar
 from hippodrome.core.types import FloatArray
-from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M
+from hippodrome.sim.ego_spec import REAR_AXLE_TO_FRONT_M
 from hippodrome.sim.loop.car import CENTRE_AHEAD_M, WIDTH_M
 from hippodrome.sim.loop.contact import corners_m
 from hippodrome.sim.loop.users import Users

@@ -9,7 +9,7 @@ import numpy as np
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import HippodromeError, IntArray
-from hippodrome.sim.ego import REAR_AXLE_TO_FRONT_M, WHEELBASE_M
+from hippodrome.sim.ego_spec import REAR_AXLE_TO_FRONT_M, WHEELBASE_M
 from hippodrome.sim.loop.car import ahead_of
 from hippodrome.sim.loop.types import LanePlace
 from hippodrome.sim.loop.users import Users

@@ -14,7 +14,7 @@ import numpy as np
 
 from hippodrome.core.navigation.types import Indicator
 from hippodrome.core.types import Frame, HippodromeError, Observation
-from hippodrome.sim.ego import LENGTH_M
+from hippodrome.sim.ego_spec import LENGTH_M
 from hippodrome.sim.loop.ahead import Lookout
 from hippodrome.sim.loop.barriers import bar, closed_edges
 from hippodrome.sim.loop.car import Car

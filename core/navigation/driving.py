@@ -1,0 +1,66 @@
+"""Driving on a course: the speed for the road, the goal and the next junction."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from hippodrome.core.navigation.config import DriveConfig, VehicleShape
+from hippodrome.core.navigation.course import Course, at, next_gate
+from hippodrome.core.navigation.junctions import SIGHT_M, gate_speed_mps, is_barred
+from hippodrome.core.navigation.speed import stopping_mps
+from hippodrome.core.navigation.types import Indicator, Radar
+
+LOOK_S = 0.4  # braking begins so early: the speed follows the wanted one with a lag
+GOAL_BRAKING_MPS2 = 1.2  # gentle, since the last metre counts
+CHANGE_INDICATED_M = 25.0  # before a lane change
+BARRED = "waits: somebody stands beyond the junction"
+SLOWEST_MPS = 2.5  # however unsure the place: a vehicle that stands learns nothing of it
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How fast to go on a course, what to indicate, and why."""
+
+    speed_mps: float
+    indicator: Indicator
+    reason: str
+    to_stop_m: float  # how far to where to stop; infinite if there is no need
+
+
+def pace(
+    course: Course, u_m: float, speed_mps: float, radar: Radar, sigma_m: float, config: DriveConfig, vehicle: VehicleShape
+) -> Pace:
+    """The speed at the place ``u_m`` of a course whose position is known to ``sigma_m``."""
+    wanted, reason = at(course.speed_mps, u_m + LOOK_S * speed_mps), ""
+    if sigma_m > config.unsure_m:
+        unsure = max(wanted * config.unsure_m / sigma_m, min(wanted, SLOWEST_MPS))
+        wanted, reason = unsure, "slows down: the place is not known well"
+    to_goal_m = course.goal_u_m - u_m
+    goal_mps = stopping_mps(to_goal_m - 0.5 * config.goal_tolerance_m, GOAL_BRAKING_MPS2)
+    stop_m = to_goal_m - 0.5 * config.goal_tolerance_m
+    if goal_mps < wanted:
+        wanted, reason = goal_mps, "stops at the goal"
+    gate = next_gate(course, u_m)
+    indicator = Indicator.STRAIGHT
+    if gate is not None and gate.entry_u_m < course.goal_u_m:
+        to_stop_m = gate.entry_u_m - vehicle.front_m - config.stop_before_m - u_m
+        if to_stop_m < SIGHT_M:
+            indicator = gate.indicator
+        slowed, why = gate_speed_mps(to_stop_m, speed_mps, radar, config)
+        if gate.indicator is Indicator.STRAIGHT and is_barred(to_stop_m, speed_mps, radar):
+            slowed, why = stopping_mps(to_stop_m, config.braking_mps2), BARRED
+        stop_m = min(stop_m, to_stop_m) if math.isfinite(slowed) else stop_m
+        if slowed < wanted:
+            wanted, reason = slowed, why
+    if indicator is Indicator.STRAIGHT:
+        indicator = _change_indicated(course, u_m)
+    return Pace(wanted if math.isfinite(wanted) else 0.0, indicator, reason, stop_m)
+
+
+def _change_indicated(course: Course, u_m: float) -> Indicator:
+    """What to indicate for a lane change that is due."""
+    for change_m, left in zip(course.changes_u_m, course.changes_left, strict=True):
+        if -0.5 * CHANGE_INDICATED_M < change_m - u_m < CHANGE_INDICATED_M:
+            return Indicator.LEFT if left else Indicator.RIGHT
+    return Indicator.STRAIGHT

@@ -1,0 +1,92 @@
+"""How fast the vehicle is, in metres per second, though its odometry counts in units of unknown length.
+
+Before views tell the scale, three things do: what is expected of it, the dashes that pass (``dashes``), and the vehicle
+itself: in a steered turn the yaw rate is v tan(delta) / L (the single-track model), and the gyro measures it in radians.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from hippodrome.core.navigation.config import VehicleShape
+from hippodrome.core.types import Observation
+
+PRIOR_SIGMA = 0.28  # of ln(scale): two drives differ by a fifth each
+VISUAL_SIGMA, VISUAL_M = 0.02, 15.0  # what passing dashes tell, once they have been seen over so many metres
+TOLD_SIGMA, TOLD_PER_M = (
+    0.03,
+    0.02,
+)  # what the localizer tells, and how fast it is followed: one wrong view moves its scale by a tenth
+SETTLED_M, TOLD_AT_FIRST_PER_M = 20.0, 0.1  # after a fix the localizer finds the scale within some 20 m
+STEERED_SIGMA, STEERED_RAD = 0.07, 0.4  # what turns tell, once the vehicle has turned so much
+LEAST_BEND_1PM = 0.03  # straighter driving tells nothing of the scale
+SEEN_MEMORY = 0.97  # of the sums of what was seen, per look
+MEMORY = 0.997  # of the sums, per step of a tenth of a second: the scale wanders over some hundred metres
+WHEEL_RATE_RADPS = 0.9  # how fast the road wheels can be turned
+SPEED_TRUST = 0.25  # weight of one speed measurement: its noise is 6 % at 10 Hz
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What is known of the vehicle's motion."""
+
+    speed_mps: float = 0.0
+    steering_rad: float = 0.0  # where the road wheels stand, as they were told to
+    seen_m: float = 0.0  # sums over the drive: metres seen to pass, and units by the odometry meanwhile
+    seen_units: float = 0.0
+    turned: float = 0.0  # sum of yaw rate times what a unit turns: numerator of the least-squares scale
+    turning: float = 0.0  # sum of the squares of the latter
+    turned_rad: float = 0.0  # how much was turned in all, up to a bound
+    told: float = math.nan  # ln(scale) as the localizer tells it, smoothed; nan until it does
+    told_m: float = 0.0  # driven since it first did
+
+    def metres_per_unit(self, expected: float) -> float:
+        """The scale: a mean of ln(scale) by what is expected, dashes and turns, each with its weight."""
+        total, weight = math.log(expected) / PRIOR_SIGMA**2, 1.0 / PRIOR_SIGMA**2
+        if self.seen_m > 0.5 and self.seen_units > 0.0:
+            trust = min(self.seen_m / VISUAL_M, 1.0) ** 2 / VISUAL_SIGMA**2
+            total, weight = total + trust * math.log(self.seen_m / self.seen_units), weight + trust
+        if self.turned > 0.0 and self.turning > 0.0:
+            trust = min(self.turned_rad / STEERED_RAD, 1.0) ** 2 / STEERED_SIGMA**2
+            total, weight = total + trust * math.log(self.turned / self.turning), weight + trust
+        if not math.isnan(self.told):
+            trust = 1.0 / (TOLD_SIGMA**2 + PRIOR_SIGMA**2 * math.exp(-self.told_m / SETTLED_M))
+            total, weight = total + trust * self.told, weight + trust
+        return math.exp(total / weight)
+
+
+def sensed(motion: Motion, observation: Observation, metres_per_unit: float, vehicle: VehicleShape) -> Motion:
+    """The motion after an observation."""
+    dt_s, units = observation.dt_s, observation.speed * observation.dt_s
+    speed = metres_per_unit * observation.speed
+    smooth = speed if speed == 0.0 else motion.speed_mps + SPEED_TRUST * (speed - motion.speed_mps)
+    bend = math.tan(motion.steering_rad) / vehicle.wheelbase_m
+    turned, turning, turned_rad = motion.turned, motion.turning, motion.turned_rad
+    if abs(bend) > LEAST_BEND_1PM and units > 0.0:
+        turned = MEMORY * turned + observation.yaw_rate_radps * dt_s * bend * units
+        turning = MEMORY * turning + (bend * units) ** 2
+        turned_rad = min(turned_rad + abs(observation.yaw_rate_radps) * dt_s, 1.0)
+    return replace(motion, speed_mps=max(smooth, 0.0), turned=turned, turning=turning, turned_rad=turned_rad)
+
+
+def seen(motion: Motion, metres: float, units: float) -> Motion:
+    """The motion after frames told that so many units of the odometry were so many metres."""
+    return replace(motion, seen_m=SEEN_MEMORY * motion.seen_m + metres, seen_units=SEEN_MEMORY * motion.seen_units + units)
+
+
+def commanded(motion: Motion, acceleration_mps2: float, steering_rad: float, dt_s: float) -> Motion:
+    """The motion as a command makes it: the wheels turn as fast as they can, the speed changes as it was told to."""
+    most = WHEEL_RATE_RADPS * dt_s
+    wheels = motion.steering_rad + min(max(steering_rad - motion.steering_rad, -most), most)
+    return replace(motion, speed_mps=max(motion.speed_mps + acceleration_mps2 * dt_s, 0.0), steering_rad=wheels)
+
+
+def told(motion: Motion, metres_per_unit: float, distance_m: float) -> Motion:
+    """The motion after the localizer told its scale, over a distance in which it was sure of its place."""
+    new = math.log(metres_per_unit)
+    if math.isnan(motion.told):
+        return replace(motion, told=new)
+    share = TOLD_PER_M if motion.told_m > 2.0 * SETTLED_M else TOLD_AT_FIRST_PER_M
+    smooth = motion.told + min(share * distance_m, 1.0) * (new - motion.told)
+    return replace(motion, told=smooth, told_m=motion.told_m + distance_m)

@@ -1,0 +1,141 @@
+"""Driving without a fix: on sight, along the border on the own side of the road."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hippodrome.core.navigation.config import DriveConfig, VehicleShape
+from hippodrome.core.navigation.course import indicated
+from hippodrome.core.navigation.junctions import gate_speed_mps
+from hippodrome.core.navigation.sight import STEP_M, Ground
+from hippodrome.core.navigation.speed import stopping_mps
+from hippodrome.core.navigation.steering import lane_curvature_1pm
+from hippodrome.core.navigation.types import Indicator, Radar
+from hippodrome.core.reading.types import LaneEnd, RoadReading
+
+KERB_M = 1.6  # from what is no road to the middle of such a lane
+BESIDE_M = 1.35  # from the edge line to the middle of a lane of 3.2 m whose line is painted inside of the border
+PREVIEW_S = 0.25  # the wheels take their time to turn
+LOOK_M = 14.0  # of the way ahead
+CORNER_RAD = 0.3  # a way that has turned so much goes round a corner
+BESIDE_RANGE_M = (0.9, 1.9)  # what that distance can be
+FRESH_M = 2.5  # a lane that was read is steered by for so long
+FORGOTTEN_M = 8.0  # after so long without a reading, any reading is believed
+JUMP_M = 0.6  # readings that differ by more are of different lanes
+STRAIGHT_M = 6.0  # without a corner so far ahead, the lane that is read is steered by, and not the border
+CREEP_GAP_M = 4.0
+FREE_MARGIN_M = -1.5  # the way along the border cuts corners of what is no road by a cell or two
+SEARCH_LATERAL = 0.6  # of the lateral acceleration: corners that nobody knows are taken slowly
+BLIND_M = 5.0  # the way is driven so far without a border beside it, at walking pace
+SURE_M2 = 0.03  # variance of an offset in the lane that is steered by
+
+
+@dataclass(frozen=True, slots=True)
+class LaneMemory:
+    """The lane as it was read last, moved on by dead reckoning; and how far its middle is from the border on the own side.
+
+    Args:
+        offset_m, heading_rad, curvature_1pm: as in ``RoadReading``.
+        since_m: driven since the lane was read.
+        beside_m: from the border of the ground's map to the lane's middle, learnt where both are seen.
+    """
+
+    offset_m: float = 0.0
+    heading_rad: float = 0.0
+    curvature_1pm: float = 0.0
+    since_m: float = math.inf
+    beside_m: float = BESIDE_M
+
+    @property
+    def is_fresh(self) -> bool:
+        """Whether the lane is known well enough to steer by."""
+        return self.since_m < FRESH_M
+
+
+def remembered(
+    memory: LaneMemory, reading: RoadReading | None, distance_m: float, turned_rad: float, border_m: float, side: float
+) -> LaneMemory:
+    """The memory after a step and, where there is one, a reading. A reading that jumps aside is of another lane and is left out.
+
+    ``border_m`` is the distance to the border on the own ``side`` in the ground's map, nan where none is known.
+    """
+    heading = memory.heading_rad + turned_rad - memory.curvature_1pm * distance_m
+    offset, since = memory.offset_m + distance_m * math.sin(heading), memory.since_m + distance_m
+    moved = replace(memory, offset_m=offset, heading_rad=heading, since_m=since)
+    if reading is None or reading.offset_variance_m2 > SURE_M2 or not math.isfinite(reading.heading_rad):
+        return moved
+    if since < FORGOTTEN_M and abs(reading.offset_m - offset) > JUMP_M:
+        return moved
+    new = 1.0 if since > FORGOTTEN_M else 0.5
+    bend = reading.curvature_1pm if math.isfinite(reading.curvature_1pm) else 0.0
+    seen = replace(
+        moved,
+        offset_m=offset + new * (reading.offset_m - offset),
+        heading_rad=heading + new * (reading.heading_rad - heading),
+        curvature_1pm=memory.curvature_1pm + 0.3 * (bend - memory.curvature_1pm),
+        since_m=0.0,
+    )
+    middle_m = border_m + side * seen.offset_m
+    if BESIDE_RANGE_M[0] < middle_m < BESIDE_RANGE_M[1] and abs(seen.heading_rad) < CORNER_RAD:
+        seen = replace(seen, beside_m=memory.beside_m + 0.1 * (middle_m - memory.beside_m))
+    return seen
+
+
+@dataclass(frozen=True, slots=True)
+class SearchStep:
+    """How to go on."""
+
+    curvature_1pm: float
+    speed_mps: float
+    indicator: Indicator
+    reason: str
+    may_creep: bool  # only the road itself is in question: nobody has to be let pass, and nothing is near
+
+
+def search_step(
+    ground: Ground, memory: LaneMemory, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float,
+    bend_1pm: float, straight_on: bool, begins: bool, config: DriveConfig, vehicle: VehicleShape,
+) -> SearchStep:  # fmt: skip
+    """The next step along the border on the own ``side``: -1 right, +1 left; ``bend_1pm`` is what the vehicle drives now.
+
+    ``straight_on`` passes side streets; with ``begins`` the ground beside the vehicle has not been seen yet.
+    """
+    way = ground.way(bend_1pm, side, KERB_M, straight_on, LOOK_M)
+    bends, turned = way.curvature_1pm, way.heading_rad - way.heading_rad[0]
+    near = min(int(PREVIEW_S * speed_mps / STEP_M), len(bends) - 1)
+    curvature = float(bends[near])
+    straight = begins or bool(np.max(np.abs(turned[: int(STRAIGHT_M / STEP_M)])) < CORNER_RAD)
+    if memory.is_fresh and straight:
+        bend, offset_m, heading = memory.curvature_1pm, memory.offset_m, memory.heading_rad
+        curvature = lane_curvature_1pm(bend, offset_m, heading, speed_mps, config)
+    wanted, reason = config.search_mps, "looks for known ground"
+    first_m = STRAIGHT_M if memory.is_fresh and straight else 0.0  # up to there the lane is driven, and not the border
+    ahead = np.abs(bends[int(first_m / STEP_M) :])
+    braking = 2.0 * config.braking_mps2 * (first_m + STEP_M * np.arange(len(ahead)))
+    wanted = min(wanted, float(np.min(np.sqrt(SEARCH_LATERAL * config.lateral_mps2 / np.maximum(ahead, 1e-3) + braking))))
+    if way.free_m < LOOK_M:
+        ahead_mps = stopping_mps(way.free_m - vehicle.front_m - FREE_MARGIN_M, config.braking_mps2)
+        wanted, reason = (ahead_mps, "sees no road ahead") if ahead_mps < wanted else (wanted, reason)
+    if not np.any(way.seen[: int(BLIND_M / STEP_M)]):
+        wanted, reason = min(wanted, config.creep_mps), "sees no border of the road"
+    to_stop_m = _to_stop_m(turned, reading, vehicle)
+    slowed, why = gate_speed_mps(to_stop_m, speed_mps, radar, config)
+    if not math.isfinite(to_stop_m) and not (radar.way_is_free and radar.lamp.value < 2):
+        slowed, why = config.search_mps / 2.0, "a junction is ahead"
+    if slowed < wanted:
+        wanted, reason = slowed, why
+    may_creep = not why and radar.gap_m > CREEP_GAP_M
+    return SearchStep(curvature, wanted, indicated(float(turned[-1])), reason, may_creep)
+
+
+def _to_stop_m(turned_rad: np.ndarray, reading: RoadReading | None, vehicle: VehicleShape) -> float:
+    """How far the bumper may go before the junction ahead, if one is seen: up to the stop line, or to where the border turns."""
+    if reading is not None and reading.end is not LaneEnd.NOTHING and math.isfinite(reading.end_m):
+        return reading.end_m - vehicle.front_m - 0.3
+    corner = np.flatnonzero(np.abs(turned_rad) > CORNER_RAD)
+    if len(corner) == 0:
+        return math.inf
+    return STEP_M * float(corner[0]) - vehicle.front_m - 2.0

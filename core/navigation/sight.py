@@ -1,0 +1,291 @@
+"""Driving on sight: what of the ground is road, kept around the vehicle as it moves, and the way along the near border of it.
+
+A driver who does not know the place keeps to the border on the own side of the road: along the street it is the edge line, at a
+junction it leads round the corner into the next street. So the vehicle keeps to its lane, never meets oncoming traffic, and comes
+round the block. The border lies below the camera's view where the vehicle is beside it, hence a map of the ground around the
+vehicle, built from the frames and moved with dead reckoning (an occupancy grid: Elfes, "Using occupancy grids for mobile robot
+perception and navigation", Computer 22, 1989).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numba import njit
+
+from hippodrome.core.types import FloatArray, Frame, UInt8Array
+from hippodrome.core.views.odometry import CameraGeometry
+
+CELL_M = 0.2
+CELLS = 400  # along each side: 80 m, in which the vehicle is kept 20 m away from the rim
+SHIFT_M = 20.0
+FAR_M = 12.0  # a pixel farther away spans more than a metre
+UNKNOWN, ROAD, OTHER, PAINT = 0, 1, 2, 3
+DARKEST, BRIGHTEST, PAINT_LEVEL = 0.45, 1.38, 1.7  # levels relative to the asphalt right ahead: shade, kerbstones, paint
+COLOURFUL = 0.16  # difference between a pixel's colours, relative to its level, from which on it is grass
+PATCH_M = (5.5, 0.9)  # the asphalt right ahead: so far ahead of the rear axle and to either side
+STEADY = 0.85  # weight of the past in the level of the asphalt
+
+FITS_SHARE = 0.1  # of a path that may seem to be no road: its cells are as coarse as that
+SHIFT_STEP_M = 0.5
+
+STEP_M = 0.25  # of the way along the border
+REACH_M = 3.4  # how far aside the border is looked for
+NEAR_M = 0.5  # ahead of the rear axle, where the distance to the paint is measured
+AHEAD_M = 1.0  # ahead of the rear axle, where the line of equal distance from the border is followed
+SLOPE_M = 0.3  # over which the direction of the border is taken
+AROUND = 80  # cells on each side of the vehicle in which the way is looked for: 16 m
+SPECK = np.ones((3, 3), dtype=np.uint8)  # fewer cells than that are no border, but the rim of a painted line
+STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
+UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
+OTHER_SIDE_1PM = 0.12  # and more so where the other side of the road is nearest
+MOST_TURN_RAD = 1.9
+RECEDES_RAD, STRAIGHT_ON_M = 0.25, 0.2  # a border that leads away by so much is a side street's, for who goes straight on
+LEAST_ROOM_M = 0.5  # nearer to what is no road no wheel has room
+DECAY_M = 2.6  # distance over which an offset from the way fades
+TIGHTEST_1PM = 0.29  # a little less than the turning circle
+BEND_PER_STEP = 0.07
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroundView:
+    """Where the pixels of frames of one size meet the ground, in the vehicle's axes (rear axle, x forward, y left)."""
+
+    rows: slice
+    ahead_m: FloatArray  # (h, w)
+    left_m: FloatArray  # (h, w)
+
+
+def ground_view(camera: CameraGeometry, width_px: int, height_px: int) -> GroundView:
+    """The ground that a level camera sees up to ``FAR_M``."""
+    focal = camera.focal_px(width_px)
+    first = math.ceil(0.5 * (height_px - 1) + focal * camera.height_m / FAR_M)
+    below = np.arange(first, height_px) - 0.5 * (height_px - 1)
+    depth = focal * camera.height_m / np.maximum(below, 1e-3)
+    across = (np.arange(width_px) - 0.5 * (width_px - 1)) / focal
+    ahead = np.repeat(depth[:, None], width_px, axis=1) + camera.forward_m
+    return GroundView(slice(first, height_px), ahead, -depth[:, None] * across[None, :])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """The way along the border from where the vehicle is: (n,) samples ``STEP_M`` apart, in the axes of the ground's map."""
+
+    curvature_1pm: FloatArray
+    heading_rad: FloatArray
+    seen: FloatArray  # 1 where the border was found beside the sample, 0 where it was not
+    free_m: float  # length of the way up to something that is no road
+
+
+class Ground:
+    """The ground around the vehicle. Its axes are those of dead reckoning from where it began."""
+
+    def __init__(self, camera: CameraGeometry) -> None:
+        self._camera = camera
+        self._view: GroundView | None = None
+        self._cells: UInt8Array = np.zeros((CELLS, CELLS), dtype=np.uint8)
+        self._origin_m = np.array([-0.5 * CELLS * CELL_M, -0.5 * CELLS * CELL_M])
+        self._level = math.nan
+        self.pose = np.zeros(3)  # of the rear axle
+
+    def move(self, distance_m: float, turned_rad: float) -> None:
+        """Dead reckoning by a short arc."""
+        chord = self.pose[2] + 0.5 * turned_rad
+        step = np.array([distance_m * math.cos(chord), distance_m * math.sin(chord), turned_rad])
+        self.pose = self.pose + step
+        aside = (self.pose[:2] - self._origin_m) / (CELLS * CELL_M) - 0.5
+        for axis in (0, 1):
+            if abs(aside[axis]) * CELLS * CELL_M > SHIFT_M:
+                self._shift(axis, int(math.copysign(SHIFT_M / CELL_M, aside[axis])))
+
+    def _shift(self, axis: int, cells: int) -> None:
+        rolled = np.roll(self._cells, -cells, axis=axis)
+        new = [slice(None), slice(None)]
+        new[axis] = slice(CELLS - cells, None) if cells > 0 else slice(0, -cells)
+        rolled[tuple(new)] = UNKNOWN
+        self._cells = rolled
+        self._origin_m = self._origin_m.copy()
+        self._origin_m[axis] += cells * CELL_M
+
+    def see(self, frame: Frame, gap_m: float) -> None:
+        """Enter a frame; what lies beyond the next vehicle ahead, ``gap_m`` from the bumper, is hidden."""
+        if self._view is None or self._view.ahead_m.shape[1] != frame.shape[1]:
+            self._view = ground_view(self._camera, frame.shape[1], frame.shape[0])
+        view = self._view
+        part = frame[view.rows].astype(np.float32)
+        level = part.mean(axis=2) if part.ndim == 3 else part
+        patch = (view.ahead_m < PATCH_M[0]) & (np.abs(view.left_m) < PATCH_M[1])
+        here = float(np.median(level[patch]))
+        usual = here if math.isnan(self._level) else self._level
+        if 0.5 < here / max(usual, 1.0) < 1.5:
+            self._level = STEADY * usual + (1.0 - STEADY) * here
+        relative = level / max(self._level, 1.0)
+        kind = np.where((relative > DARKEST) & (relative < BRIGHTEST), ROAD, OTHER).astype(np.uint8)
+        if part.ndim == 3:
+            colour = (part.max(axis=2) - part.min(axis=2)) / np.maximum(level, 1.0)
+            kind[colour > COLOURFUL] = OTHER
+            kind[(relative > PAINT_LEVEL) & (colour < COLOURFUL)] = PAINT
+        else:
+            kind[relative > PAINT_LEVEL] = PAINT
+        reach = min(FAR_M + self._camera.forward_m, gap_m + 2.6)
+        near = view.ahead_m < reach
+        _enter(self._cells, self._origin_m, self.pose, view.ahead_m[near], view.left_m[near], kind[near])
+
+    def way(self, bend_1pm: float, side: float, beside_m: float, straight_on: bool, length_m: float) -> Way:
+        """The way that keeps ``beside_m`` from what is no road on one side: +1 left, -1 right; it begins with a curvature.
+
+        With ``straight_on`` it passes side streets on that side, and where the road ends it turns to the other side.
+        """
+        middle = ((self.pose[:2] - self._origin_m) / CELL_M).astype(np.int64)
+        low = np.clip(middle - AROUND, 0, CELLS - 2 * AROUND)
+        part = self._cells[low[0] : low[0] + 2 * AROUND, low[1] : low[1] + 2 * AROUND]
+        other = (part == OTHER).astype(np.uint8)
+        other = cv2.morphologyEx(cv2.morphologyEx(other, cv2.MORPH_OPEN, SPECK), cv2.MORPH_CLOSE, STRIPES)
+        field = CELL_M * cv2.distanceTransform(1 - other, cv2.DIST_L2, 5).astype(np.float64)
+        corner_m = self._origin_m + CELL_M * low
+        rows = _along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
+        blocked = np.flatnonzero(rows[:, 3] < LEAST_ROOM_M)
+        free_m = STEP_M * float(blocked[0] if len(blocked) else len(rows))
+        return Way(rows[:, 0], rows[:, 1], rows[:, 2], free_m)
+
+    def border_m(self, side: float) -> float:
+        """Distance from the vehicle's line of travel to the border on one side, just ahead of the rear axle; nan if unknown."""
+        x, y = self.pose[0] + NEAR_M * math.cos(self.pose[2]), self.pose[1] + NEAR_M * math.sin(self.pose[2])
+        found = float(_border_m(self._cells, self._origin_m, x, y, self.pose[2], side))
+        return found if 0.0 <= found < REACH_M else math.nan
+
+    def best_shift_m(self, points_m: FloatArray, most_m: float) -> tuple[float, float]:
+        """By how much points (n, 2) in the vehicle's axes have to come nearer to lie on the road, and which share then does not.
+
+        The least shift of at most ``most_m`` either way that is good enough counts; 0 if they lie on the road as they are.
+        """
+        share = self.off_road_share(points_m)
+        if share <= FITS_SHARE:
+            return 0.0, share
+        best = (0.0, share)
+        for k in range(1, int(most_m / SHIFT_STEP_M) + 1):
+            for shift_m in (k * SHIFT_STEP_M, -k * SHIFT_STEP_M):
+                share = self.off_road_share(points_m - np.array([shift_m, 0.0]))
+                if share <= FITS_SHARE:
+                    return shift_m, share
+                if share < best[1] - 0.05:
+                    best = shift_m, share
+        return best
+
+    def off_road_share(self, points_m: FloatArray) -> float:
+        """Which share of points (n, 2) in the vehicle's axes is known to be no road, of those that are known."""
+        cos, sin = math.cos(self.pose[2]), math.sin(self.pose[2])
+        x = self.pose[0] + cos * points_m[:, 0] - sin * points_m[:, 1]
+        y = self.pose[1] + sin * points_m[:, 0] + cos * points_m[:, 1]
+        i = np.floor((x - self._origin_m[0]) / CELL_M).astype(np.int64)
+        j = np.floor((y - self._origin_m[1]) / CELL_M).astype(np.int64)
+        inside = (i >= 0) & (j >= 0) & (i < CELLS) & (j < CELLS)
+        kind = self._cells[i[inside], j[inside]]
+        known = kind != UNKNOWN
+        return float(np.mean(kind[known] == OTHER)) if known.any() else 0.0
+
+
+@njit(cache=True)
+def _enter(
+    cells: UInt8Array, origin: FloatArray, pose: FloatArray, ahead: FloatArray, left: FloatArray, kind: UInt8Array
+) -> None:
+    """Write pixels into the cells; of one frame, paint counts before all else, and what is no road before road."""
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    n = len(kind)
+    index = np.empty((n, 2), dtype=np.int64)
+    for k in range(n):
+        x, y = pose[0] + cos * ahead[k] - sin * left[k], pose[1] + sin * ahead[k] + cos * left[k]
+        i, j = math.floor((x - origin[0]) / CELL_M), math.floor((y - origin[1]) / CELL_M)
+        index[k, 0], index[k, 1] = (i, j) if 0 <= i < CELLS and 0 <= j < CELLS else (-1, -1)
+        if index[k, 0] >= 0:
+            cells[i, j] = UNKNOWN
+    for k in range(n):
+        i, j = index[k]
+        if i >= 0 and kind[k] > cells[i, j]:
+            cells[i, j] = kind[k]
+
+
+@njit(cache=True)
+def _kind_at(cells: UInt8Array, origin: FloatArray, x: float, y: float) -> int:
+    i, j = math.floor((x - origin[0]) / CELL_M), math.floor((y - origin[1]) / CELL_M)
+    if i < 0 or j < 0 or i >= CELLS or j >= CELLS:
+        return UNKNOWN
+    return int(cells[i, j])
+
+
+@njit(cache=True)
+def _border_m(cells: UInt8Array, origin: FloatArray, x: float, y: float, heading: float, side: float) -> float:
+    """Distance from a point to the border on one side; nan if none is known, -1 if the point itself is no road."""
+    if _kind_at(cells, origin, x, y) >= OTHER:
+        return -1.0
+    unknown = 0
+    for k in range(1, int(REACH_M / 0.1) + 1):
+        far = 0.1 * k
+        kind = _kind_at(cells, origin, x - side * far * math.sin(heading), y + side * far * math.cos(heading))
+        if kind >= OTHER:
+            return far if unknown < 10 else np.nan
+        if kind == UNKNOWN:
+            unknown += 1
+    return REACH_M if unknown < 10 else np.nan
+
+
+@njit(cache=True)
+def _distance_at(field: FloatArray, corner: FloatArray, x: float, y: float) -> float:
+    """The distance field between its cells' middles; far away beyond its rim."""
+    u, v = (x - corner[0]) / CELL_M - 0.5, (y - corner[1]) / CELL_M - 0.5
+    i, j = math.floor(u), math.floor(v)
+    if i < 0 or j < 0 or i >= field.shape[0] - 1 or j >= field.shape[1] - 1:
+        return 2.0 * REACH_M
+    p, q = u - i, v - j
+    low = (1.0 - q) * field[i, j] + q * field[i, j + 1]
+    high = (1.0 - q) * field[i + 1, j] + q * field[i + 1, j + 1]
+    return float((1.0 - p) * low + p * high)
+
+
+@njit(cache=True)
+def _along_border(
+    field: FloatArray,
+    corner: FloatArray,
+    pose: FloatArray,
+    bend: float,
+    side: float,
+    beside_m: float,
+    straight_on: bool,
+    count: int,
+) -> FloatArray:
+    """The way: rows (count, 4) of curvature, heading, whether the border was seen, and the distance to what is no road.
+
+    The vehicle's law of steering (Samson) acts on the line of equal distance from the border: round a sharp corner that line is
+    an arc, and where the road bends away the border comes nearer ahead.
+    """
+    rows = np.zeros((count, 4))
+    x, y, heading = pose[0], pose[1], pose[2]
+    for k in range(count):
+        cos, sin = math.cos(heading), math.sin(heading)
+        px, py = x + AHEAD_M * cos, y + AHEAD_M * sin
+        d = _distance_at(field, corner, px, py)
+        gx = _distance_at(field, corner, px + SLOPE_M, py) - _distance_at(field, corner, px - SLOPE_M, py)
+        gy = _distance_at(field, corner, px, py + SLOPE_M) - _distance_at(field, corner, px, py - SLOPE_M)
+        seen = d < REACH_M and gx * gx + gy * gy > 1e-6
+        wanted = 0.0 if straight_on else side * UNSEEN_1PM
+        if seen:
+            along = math.atan2(gy, gx) + side * 0.5 * math.pi  # the border's direction, with the border on the own side
+            turn = (heading - along + math.pi) % (2.0 * math.pi) - math.pi
+            off = side * (beside_m - min(d, beside_m + 1.0))  # of the vehicle to the left of its line
+            if straight_on and side * turn < -RECEDES_RAD and d > beside_m - STRAIGHT_ON_M:
+                wanted = 0.0  # the border leads into a side street
+            elif abs(turn) < MOST_TURN_RAD:
+                wanted = -off / DECAY_M**2 - 2.0 * turn / DECAY_M
+            else:  # what is nearest is the border of the other side
+                wanted = side * OTHER_SIDE_1PM
+        wanted = min(max(wanted, -TIGHTEST_1PM), TIGHTEST_1PM)
+        bend += min(max(wanted - bend, -BEND_PER_STEP), BEND_PER_STEP)
+        rows[k, 0], rows[k, 1] = bend, heading
+        rows[k, 2] = 1.0 if seen else 0.0
+        rows[k, 3] = _distance_at(field, corner, x, y)
+        x, y = x + STEP_M * cos, y + STEP_M * sin
+        heading += STEP_M * bend
+    return rows

@@ -1,0 +1,68 @@
+"""``hippodrome drive``: missions in the loop."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from hippodrome.eval.commands.arguments import (
+    DONE,
+    THRESHOLD_FAILED,
+    add_command,
+    add_out,
+    add_scenarios,
+    add_workers,
+    positive,
+)
+
+ROW_KEYS = ("ours", "truth", "dead-reckoning", "no-reading", "paper", "kalman")
+
+
+def add_mission_command(commands: Any) -> None:
+    """Adds ``drive`` to the parser's ``commands``."""
+    parser = add_command(
+        commands, "drive", _drive, "let the vehicle drive to goals on its own map, in the loop",
+        """Let the vehicle drive to goals on its own map, among the scenario's traffic, and score it.
+
+        For each scenario the mapping drive is simulated and mapped as by `hippodrome eval`. Then missions are drawn by seed: the
+        vehicle wakes up at a place that it is not told, and is to stop at a goal of which it is told place and heading. It sees
+        camera frames, its own motion and a radar. docs/loop.md tells what is driven and how it is scored.
+
+        Writes DIR/results.json, with the figures below `drive` of each row, and DIR/drive.html, one page with the driven ways.
+        Finished missions are kept: the same command goes on where it was.
+
+        Exits with 1 if there was a collision at fault, wrong-way driving or a false arrival.""",
+        ["hippodrome drive scenarios/missions/grid.yaml --missions 3",
+         "hippodrome drive scenarios/missions/*.yaml --rows ours truth dead-reckoning --workers 2",
+         "hippodrome drive scenarios/missions/radial.yaml --missions 1 --film"],
+    )  # fmt: skip
+    add_scenarios(parser, several=True)
+    parser.add_argument(
+        "--missions",
+        type=positive,
+        default=10,
+        metavar="N",
+        help="missions in each town; the first are the same for every N (default: 10)",
+    )
+    parser.add_argument(
+        "--rows", nargs="+", choices=ROW_KEYS, default=["ours", "truth"], metavar="ROW",
+        help="who drives. ours: from an unknown start; truth: the same, told its true pose (the upper bound); dead-reckoning: "
+             "told the true start, and nothing later (the lower bound); no-reading: without the lane read from the frames; "
+             "paper, kalman: with these modes of the localizer (default: ours truth)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--film", action="store_true",
+        help="write an animated WebP of each mission too: the camera, and from above the roads, the plan and the belief",
+    )  # fmt: skip
+    add_workers(parser)
+    add_out(parser, "out/drive")
+
+
+def _drive(options: argparse.Namespace) -> int:
+    from hippodrome.eval.drive.run import DriveRequest, drive
+
+    request = DriveRequest(
+        scenarios=options.scenarios, network=options.network, seed=options.seed, missions=options.missions, rows=options.rows,
+        workers=options.workers, out=options.out, film=options.film,
+    )  # fmt: skip
+    return DONE if drive(request) else THRESHOLD_FAILED

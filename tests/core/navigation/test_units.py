@@ -1,0 +1,150 @@
+"""Steering, speed, junctions, motion, dashes, track: each against numbers worked out by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hippodrome.core.navigation import motion as motions
+from hippodrome.core.navigation import track as tracks
+from hippodrome.core.navigation.config import DriveConfig, VehicleShape, WatchConfig
+from hippodrome.core.navigation.dashes import driven_m, line_levels
+from hippodrome.core.navigation.junctions import gate_speed_mps
+from hippodrome.core.navigation.speed import can_stop, following_mps2, stop_mps2, stopping_mps
+from hippodrome.core.navigation.steering import lane_curvature_1pm, steering_rad
+from hippodrome.core.navigation.types import Lamp, Radar
+from hippodrome.core.navigation.watch import SensorHealth, watched
+from hippodrome.core.reading.types import LaneEnd, RoadReading
+from hippodrome.core.types import Observation
+from hippodrome.core.views.odometry import CameraGeometry
+
+DRIVE, VEHICLE, CAMERA = DriveConfig(), VehicleShape(), CameraGeometry()
+
+
+def test_samsons_law_steers_back_to_the_lane():
+    assert lane_curvature_1pm(0.1, 0.0, 0.0, 5.0, DRIVE) == pytest.approx(0.1)
+    assert lane_curvature_1pm(0.0, 0.9, 0.0, 5.0, DRIVE) == pytest.approx(-0.9 / 9.0)
+    assert lane_curvature_1pm(0.0, 0.0, 0.3, 5.0, DRIVE) == pytest.approx(-2.0 * 0.3 / 3.0)
+
+
+def test_the_wheels_stand_as_the_bicycle_needs_them_and_never_beyond_their_stop():
+    assert steering_rad(0.1, 1.0, DRIVE, VEHICLE) == pytest.approx(math.atan(0.27))
+    assert steering_rad(9.0, 0.0, DRIVE, VEHICLE) == VEHICLE.max_steering_rad
+    assert steering_rad(0.3, 10.0, DRIVE, VEHICLE) == pytest.approx(math.atan(2.7 * 0.03))
+
+
+def test_stopping_is_half_of_the_speed_squared_over_the_braking():
+    assert stopping_mps(4.0, 2.0) == 4.0
+    assert can_stop(4.0, 4.0, 2.0) and not can_stop(3.9, 4.0, 2.0)
+    assert stop_mps2(4.0, 4.0, DRIVE, VEHICLE) == pytest.approx(-2.0)
+    assert math.isinf(stop_mps2(4.0, 40.0, DRIVE, VEHICLE)) and math.isinf(stop_mps2(4.0, math.inf, DRIVE, VEHICLE))
+
+
+def test_the_intelligent_driver_model_holds_its_gap():
+    wanted = DRIVE.jam_gap_m + 10.0 * DRIVE.headway_s
+    assert following_mps2(10.0, Radar(wanted, 0.0), DRIVE, VEHICLE) == pytest.approx(0.0)
+    assert following_mps2(10.0, Radar(0.5 * wanted, 0.0), DRIVE, VEHICLE) == pytest.approx(-3.0 * DRIVE.acceleration_mps2)
+    assert math.isinf(following_mps2(10.0, Radar(), DRIVE, VEHICLE))
+    assert following_mps2(10.0, Radar(8.0, 10.0), DRIVE, VEHICLE) == -VEHICLE.max_braking_mps2
+
+
+@pytest.mark.parametrize(
+    ("to_stop_m", "speed", "radar", "stops"),
+    [
+        (10.0, 5.0, Radar(lamp=Lamp.RED), True),
+        (10.0, 5.0, Radar(lamp=Lamp.GREEN), False),
+        (10.0, 5.0, Radar(way_is_free=False), True),
+        (10.0, 5.0, Radar(), False),
+        (1.0, 8.0, Radar(lamp=Lamp.YELLOW), False),  # too late to stop
+        (10.0, 8.0, Radar(lamp=Lamp.YELLOW), True),
+        (-2.0, 3.0, Radar(lamp=Lamp.RED), False),  # in the junction already
+        (60.0, 8.0, Radar(lamp=Lamp.RED), False),  # far off
+    ],
+)
+def test_who_goes_into_a_junction(to_stop_m, speed, radar, stops):
+    assert math.isfinite(gate_speed_mps(to_stop_m, speed, radar, DRIVE)[0]) == stops
+
+
+def test_a_steered_turn_tells_the_scale():
+    motion = motions.Motion(speed_mps=4.0, steering_rad=0.4)
+    bend = math.tan(0.4) / VEHICLE.wheelbase_m
+    for k in range(100):  # the odometry says 2 units per second, the vehicle drives 4 m/s
+        seen = Observation(0.1 * (k + 1), 0.1, 2.0, 4.0 * bend)
+        motion = motions.sensed(motion, seen, 2.0, VEHICLE)
+    assert motion.turned / motion.turning == pytest.approx(2.0)
+    assert motion.metres_per_unit(1.6) == pytest.approx(2.0, rel=0.04)
+
+
+def dashed_road(driven):
+    """A frame with a dashed line 1.6 m to the left: dashes of 3 m every 9 m, seen after so many metres."""
+    frame = np.full((120, 160, 3), 100, dtype=np.uint8)
+    focal, rows = CAMERA.focal_px(160), np.arange(60, 120)
+    depth = focal * (CAMERA.height_m - 0.05) / np.maximum(rows - 59.5, 0.5)
+    along = depth + CAMERA.forward_m + driven
+    for row, far, place in zip(rows, depth, along, strict=True):
+        if place % 9.0 < 3.0:
+            column = round(79.5 - focal * 1.6 / far)
+            frame[row, max(column - 1, 0) : max(column + 2, 0)] = 235
+    return frame
+
+
+@pytest.mark.parametrize("step_m", [0.9, 1.7, 2.6])
+def test_passing_dashes_tell_the_metres(step_m):
+    before, after = (line_levels(dashed_road(at), CAMERA, 0.0, 0.0, 0.0, 1.0) for at in (4.0, 4.0 + step_m))
+    assert driven_m(before, after, 0.6 * step_m) == pytest.approx(step_m, abs=0.15)
+
+
+def test_plain_asphalt_tells_nothing():
+    plain = line_levels(np.full((120, 160, 3), 100, dtype=np.uint8), CAMERA, 0.0, 0.0, 0.0, 1.0)
+    assert math.isnan(driven_m(plain, plain, 1.5))
+
+
+def test_the_lane_corrects_across_and_its_end_along():
+    track = tracks.begun(np.array([10.0, 0.6, 0.0]), np.diag([4.0, 1.0, 0.01]))
+    reading = RoadReading(offset_m=0.0, offset_variance_m2=0.01, heading_rad=0.0, heading_variance_rad2=1e-4)
+    across, fits = tracks.with_lane(track, reading, np.array([10.0, 0.0]), 0.0)
+    assert fits and abs(across.pose[1]) < 0.03 and across.pose[0] == pytest.approx(10.0)
+    line = RoadReading(end_m=7.1, end_variance_m2=0.01, end=LaneEnd.STOP_LINE)  # 8 m to the end of the lane, 10 m were believed
+    along, fits = tracks.with_end(track, line, 10.0, 0.0)
+    assert fits and along.pose[0] == pytest.approx(12.0, abs=0.15) and along.pose[1] == pytest.approx(0.6)
+
+
+def test_a_reading_of_another_lane_is_left_out():
+    track = tracks.begun(np.array([10.0, 0.0, 0.0]), np.diag([0.04, 0.04, 1e-4]))
+    reading = RoadReading(offset_m=3.0, offset_variance_m2=0.01)
+    assert not tracks.with_lane(track, reading, np.array([10.0, 0.0]), 0.0)[1]
+
+
+def test_what_a_wrong_scale_does_grows_with_the_way_and_goes_into_the_next_street():
+    track = tracks.begun(np.zeros(3), np.diag([1e-4, 1e-4, 1e-6]))
+    for _ in range(100):
+        track = tracks.moved(track, 1.0, 0.0)
+    assert track.along_sigma_m == pytest.approx(
+        math.hypot(100 * tracks.SCALE_SIGMA, math.sqrt(100 * tracks.ALONG_PER_M)), rel=0.05
+    )
+    turned = tracks.moved(track, 0.01, 0.5 * math.pi)
+    reading = RoadReading(offset_m=0.0, offset_variance_m2=0.01)
+    known = tracks.with_lane(turned, reading, turned.pose[:2], 0.5 * math.pi)[0]
+    assert turned.covariance[0, 0] < 1.0 < 100.0 * tracks.SCALE_SIGMA and known.covariance[0, 0] < 0.05
+
+
+def failing(observe, radar=Radar(), seconds=5.0, speed=5.0, wheels=0.0):
+    health = SensorHealth()
+    for k in range(round(10 * seconds)):
+        health = watched(health, observe(k), radar, speed, wheels, WatchConfig(), VEHICLE)
+    return health.complaint(WatchConfig())
+
+
+def test_sensors_that_fail_are_named():
+    frame = np.full((120, 160, 3), 90, dtype=np.uint8)
+
+    def fine(k):
+        return Observation(0.1 * (k + 1), 0.1, 5.0, 1e-3 * math.sin(k), frame)
+
+    assert failing(fine) == (False, "")
+    assert failing(lambda k: Observation(0.1 * (k + 1), 0.1, 5.0, 1e-3 * k)) == (True, "there are no frames")
+    black = np.zeros((120, 160, 3), dtype=np.uint8)
+    assert failing(lambda k: Observation(0.1 * (k + 1), 0.1, 5.0, 1e-3 * k, black)) == (True, "the frames are black")
+    assert failing(lambda k: Observation(0.1 * (k + 1), 0.1, 5.0, 1e-3, frame)) == (True, "the gyro is frozen")
+    assert failing(fine, wheels=0.3) == (True, "the gyro does not tell how the vehicle turns")
+    assert failing(fine, Radar(blind=True)) == (True, "the radar is blind")

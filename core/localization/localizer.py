@@ -41,6 +41,9 @@ from hippodrome.core.views.sequence import Step
 __all__ = ["Localizer", "LocalizerConfig", "localize"]
 
 LANE_M = 3.0  # a lateral disagreement counts as at most this: a larger one comes from another place or from a bend
+READ_SHARE = (
+    0.5  # of lateral errors that a lane which was just read takes away: the rest is the network's, which may be drawn askew
+)
 UNREAD_AFTER_M = 20.0  # after this way the place in the lane that was read says little of the place in it
 NOT_MOVED = Step(0.0, 0.0)
 
@@ -99,6 +102,11 @@ class Localizer:
         self._match: PlaceMatch | None = None  # what the last query frame showed
         self._fix = Fix()
         roads = self._places.roads
+        if config.road_reading and roads is None:
+            raise HippodromeError(
+                "localizer.road_reading compares the lane in the frames with a road network, and none was given: give one, or "
+                "set road_reading to false"
+            )
         self._road = RoadSense(roads, config.camera) if config.road_reading and roads is not None else None
         self._since_frame = NOT_MOVED  # metres and rad since the last frame
 
@@ -242,7 +250,7 @@ class Localizer:
         other arises where a drifting heading pulls the pose aside: it is measured by how far views and belief disagree laterally.
         """
         left = np.array([-math.sin(heading_rad), math.cos(heading_rad), 0.0])
-        unread = 1.0 if self._road is None else 1.0 - math.exp(-self._road.since_m / UNREAD_AFTER_M)
+        unread = 1.0 if self._road is None else 1.0 - READ_SHARE * math.exp(-self._road.since_m / UNREAD_AFTER_M)
         return unread * (self._config.injection.wander_m**2 + self._fix.sq_lateral_m2) * np.outer(left, left)
 
 

@@ -26,6 +26,8 @@ USUAL: Final = 4.0  # ridges that a lane of the expected width is worth
 WIDTH_ERROR_M: Final = 0.07  # of a width as it is measured
 ALONE: Final = 1.0  # log odds against a lane with the road's edge on both sides
 PLACE_SIGMA_M, BEND_SIGMA_M2 = 0.01, 1.2  # error of the place in metres, and per curvature: lanes are drawn in straight pieces
+SEEN_ROWS, UNSEEN_SIGMA_M = 8.0, 0.12  # borders seen in fewer rows are mostly remembered: the lane may end here, and turn
+USUAL_RAD, TURNED_SIGMA_M = 0.07, 1.3  # who heads aside of the lane more than usual may be turning off it: error per rad beyond
 HEADING_SIGMA_RAD, BEND_SIGMA_M = 0.007, 0.8  # the same of the direction
 TOLD_M: Final = 4.5  # after so many metres all that is beside the axle has been ahead of the camera
 ALONG_RAD: Final = 0.2  # a lane in which the vehicle is heads no more aside than this
@@ -95,6 +97,9 @@ def place_in_lane(
         float(gradient @ lines.covariance @ gradient) + share**2 * sum(1.0 / float(lines.about[k, 0]) for k, _ in sides)
     )
     variance += PLACE_SIGMA_M**2 + (BEND_SIGMA_M2 * float(lines.arc[1])) ** 2
+    variance += (TURNED_SIGMA_M * max(abs(float(lines.arc[0])) - USUAL_RAD, 0.0)) ** 2
+    if sum(float(lines.traits[k, 1]) for k, _ in sides) < SEEN_ROWS:
+        variance += UNSEEN_SIGMA_M**2
     if len(sides) == 1:
         side = sides[0][1]
         edge = 1.0 / (1.0 + math.exp(-odds[sides[0]]))

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from hippodrome.core.localization.config import LocalizerConfig
+from hippodrome.core.localization.localizer import Localizer
 from hippodrome.core.localization.road import BEFORE_END_M, RoadSense
 from hippodrome.core.roads.geometry import road_geometry
 from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.types import HippodromeError
 from hippodrome.core.views.odometry import CameraGeometry
+from tests.core.looped_world import Pictures, topometric_map
 from tests.core.reading.painted import camera, road
 
 VIEW = camera()
@@ -121,6 +124,12 @@ def test_of_two_lanes_the_borders_correct_a_wrong_belief_but_not_at_once():
     measured = driven(LEFT_LANE, 0.0, 24)
     assert np.all(np.isnan(measured[:5]))
     assert np.nanmedian(measured) == pytest.approx(3.2, abs=0.15)
+
+
+def test_without_a_road_network_it_is_refused():
+    cognitive_map = topometric_map(Pictures(seed=3), np.random.default_rng(3))
+    with pytest.raises(HippodromeError, match="road_reading"):
+        Localizer(cognitive_map, None, LocalizerConfig(road_reading=True))
 
 
 def test_is_off_if_not_asked_for():

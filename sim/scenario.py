@@ -79,6 +79,21 @@ class Scenario(Spec):
     def _old_names(cls, data: Any) -> Any:
         return with_present_names(data)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _localizer_knows_the_camera(cls, data: Any) -> Any:
+        """The camera of a simulated drive is known, so the localizer reads the road in its frames; one askew sees other road."""
+        if not isinstance(data, dict):
+            return data
+        localizer, camera = data.get("localizer", {}), data.get("camera", {})
+        camera = camera.model_dump() if isinstance(camera, CameraSpec) else camera
+        if not (isinstance(localizer, dict) and isinstance(camera, dict)):
+            return data
+        is_recorded = getattr(data.get("localization"), "recording", None) or "recording" in (data.get("localization") or {})
+        seat = {name: camera[name] for name in ("fov_deg", "height_m", "forward_m") if name in camera}
+        reads = not is_recorded and not camera.get("yaw_offset_deg")
+        return {**data, "localizer": {"road_reading": reads, "camera": seat, **localizer}}
+
     @model_validator(mode="after")
     def _rates_fit(self) -> Scenario:
         camera_divider(self.camera, self.odometry_rate_hz)

@@ -25,7 +25,7 @@ class LocalizerConfig(BeliefConfig):
 
     self_motion: Literal["wheel", "visual"] = "wheel"  # wheel: as observed; visual: estimated from the frames alone
     camera: CameraGeometry = field(default_factory=CameraGeometry)  # for self_motion "visual", and for road_reading
-    road_reading: bool = False  # measure the place in the lane, and its end, by the lines in the frames; modes coupled, kalman
+    road_reading: bool = False  # place in the lane, and its end, by the lines in the frames; modes coupled, kalman
     views: ViewCellConfig = field(default_factory=ViewCellConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
     steps: KeyframeConfig = field(default_factory=lambda: KeyframeConfig(interval_s=0.4))  # denser than the map: 15 % less error

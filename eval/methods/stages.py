@@ -14,7 +14,7 @@ from typing import ParamSpec, Protocol, TypeVar
 import numpy as np
 
 from hippodrome.core import se2
-from hippodrome.core.localization.localizer import Localizer
+from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
 from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.mapping.motion_mapper import MotionMapper
 from hippodrome.core.refinement.refine import refine
@@ -218,7 +218,8 @@ def localize_files(source: Path, recording: Path, network: Path | None, scenario
     Args:
         source: The topometric map.
         recording: The drive to localize.
-        network: The road network, as for ``refine_files``, to whose lanes the estimate is pulled; None does without.
+        network: The road network, as for ``refine_files``, to whose lanes the estimate is pulled; None does without,
+            and reads no road.
         scenario: Where the localizer's settings are from; None takes the defaults.
         out: The poses that the localizer declared, as TUM. Not written if it never declared one.
     """
@@ -229,13 +230,19 @@ def localize_files(source: Path, recording: Path, network: Path | None, scenario
         raise HippodromeError(f"{source}: a semi-metric map has no metric frame to localize in; run `hippodrome refine` first")
     drive = open_recording(recording)
     roads = read_roads(network, out.parent) if network else None
-    run = localize_recording(drive.observations(), Localizer(cognitive_map, roads, _settings(scenario).localizer))
+    run = localize_recording(drive.observations(), Localizer(cognitive_map, roads, _localizer_config(scenario, roads)))
     declared = run.declared()
     if declared is not None:
         write_tum(out, declared)
     count = 0 if declared is None else len(declared.t_s)
     first = "never localized, nothing written" if declared is None else f"first at {declared.t_s[0]:.1f} s, written to {out}"
     print(f"localized in {count} of {len(run.estimates)} steps, {first}; {1e3 * run.step_s.mean():.3f} ms a step")
+
+
+def _localizer_config(scenario: Path | None, roads: RoadNetwork | None) -> LocalizerConfig:
+    """The settings of a drive whose camera is unknown if no scenario says where it sits; without roads there is none to read."""
+    config = load_scenario(scenario).localizer if scenario else LocalizerConfig()
+    return config if roads is not None else replace(config, road_reading=False)
 
 
 def _settings(scenario: Path | None) -> Scenario:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from hippodrome.core.types import FloatArray, Frame, UInt8Array
 from hippodrome.core.views.odometry import CameraGeometry
@@ -130,8 +131,9 @@ class Ground:
             kind[(relative > PAINT_LEVEL) & (colour < COLOURFUL)] = PAINT
         else:
             kind[relative > PAINT_LEVEL] = PAINT
+        kind[_hidden(kind) & (kind != OTHER)] = UNKNOWN
         reach = min(FAR_M + self._camera.forward_m, gap_m + 2.6)
-        near = view.ahead_m < reach
+        near = (view.ahead_m < reach) & (kind != UNKNOWN)
         _enter(self._cells, self._origin_m, self.pose, view.ahead_m[near], view.left_m[near], kind[near])
 
     def way(self, bend_1pm: float, side: float, beside_m: float, straight_on: bool, length_m: float) -> Way:
@@ -186,6 +188,15 @@ class Ground:
         kind = self._cells[i[inside], j[inside]]
         known = kind != UNKNOWN
         return float(np.mean(kind[known] == OTHER)) if known.any() else 0.0
+
+
+def _hidden(kind: UInt8Array) -> NDArray[np.bool_]:
+    """Pixels (h, w) above a stretch of no road in their column: a grey wall behind the pavement looks like asphalt beyond it."""
+    other = kind[::-1] == OTHER
+    begins = np.zeros(kind.shape, dtype=np.bool_)
+    begins[2:] = other[:-2] & other[1:-1] & other[2:]
+    hidden: NDArray[np.bool_] = np.maximum.accumulate(begins, axis=0)[::-1]
+    return hidden
 
 
 @njit(cache=True)

@@ -33,7 +33,7 @@ def add_mission_command(commands: Any) -> None:
 
         Exits with 1 if there was a collision at fault, wrong-way driving or a false arrival.""",
         ["hippodrome drive scenarios/missions/grid.yaml --missions 3",
-         "hippodrome drive scenarios/missions/*.yaml --rows ours truth dead-reckoning --workers 2",
+         "hippodrome drive scenarios/missions/grid.yaml scenarios/missions/rural.yaml --rows ours truth --workers 2",
          "hippodrome drive scenarios/missions/radial.yaml --missions 1 --film"],
     )  # fmt: skip
     add_scenarios(parser, several=True)

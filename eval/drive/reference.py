@@ -39,16 +39,26 @@ def reference_time_s(world: World, mission: Mission) -> float | None:
             libsumo.simulationStep()
         try:
             return _driven_s(mission, others, drive.closed)
-        except libsumo.TraCIException:  # no route, or a goal too close to where a lane begins to stop there
+        except (libsumo.TraCIException, ValueError):  # no route, or a goal too close to where a lane begins to stop there
             return None
+
+
+def _edges(start: str, goal: str, is_behind: bool) -> tuple[str, ...]:
+    """SUMO's quickest way; where the goal lies behind on the same road, round the block."""
+    if start != goal or not is_behind:
+        return tuple(libsumo.simulation.findRoute(start, goal, "ego").edges)
+    lanes = (f"{start}_{k}" for k in range(libsumo.edge.getLaneNumber(start)))
+    onward = sorted({link[0].rpartition("_")[0] for lane in lanes for link in libsumo.lane.getLinks(lane)})
+    routes = [libsumo.simulation.findRoute(edge, goal, "ego") for edge in onward]
+    best = min((route for route in routes if route.edges), key=lambda route: route.travelTime)
+    return start, *best.edges
 
 
 def _driven_s(mission: Mission, others: BackgroundTraffic, closed: Sequence[str]) -> float | None:
     for name in closed:
         libsumo.edge.adaptTraveltime(name, FOREVER_S)  # SUMO's driver knows what is closed
     start, goal = (lane.rpartition("_") for lane in (mission.start_lane, mission.goal_lane))
-    route = libsumo.simulation.findRoute(start[0], goal[0], "ego")
-    libsumo.route.add("reference", route.edges)
+    libsumo.route.add("reference", _edges(start[0], goal[0], mission.goal_m <= mission.start_m))
     front_m = mission.start_m + REAR_AXLE_TO_FRONT_M
     libsumo.vehicle.add(EGO, "reference", typeID="ego", departLane=start[2], departPos=f"{front_m:.2f}", departSpeed="0")
     stop_m = min(mission.goal_m + REAR_AXLE_TO_FRONT_M, libsumo.lane.getLength(mission.goal_lane) - 0.2)

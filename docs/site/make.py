@@ -17,7 +17,18 @@ from typing import Final
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 FROM_ROOT: Final = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
-ROOMS: Final = ("roads", "solvers", "attractors", "views", "mapping", "matching", "refinement", "localization")
+ROOMS: Final = (
+    "roads",
+    "solvers",
+    "attractors",
+    "views",
+    "mapping",
+    "matching",
+    "refinement",
+    "localization",
+    "reading",
+    "navigation",
+)
 LINK: Final = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s#]*)(#[^)\s]*)?\)")
 FRONT_DOOR: Final = """\
 # The front door

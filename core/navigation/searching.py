@@ -38,7 +38,9 @@ class LaneMemory:
     """The lane as it was read last, moved on by dead reckoning; and how far its middle is from the border on the own side.
 
     Args:
-        offset_m, heading_rad, curvature_1pm: as in ``RoadReading``.
+        offset_m: as in ``RoadReading``.
+        heading_rad: as there.
+        curvature_1pm: as there.
         since_m: driven since the lane was read.
         beside_m: from the border of the ground's map to the lane's middle, learnt where both are seen.
     """

@@ -24,8 +24,9 @@ class RoadReading:
         heading_rad: of the vehicle against the lane where the rear axle is, counter-clockwise positive.
         curvature_1pm: of the lane, left positive.
         curvature_change_1pm2: of the curvature along the lane.
-        left_edge, right_edge: probability that the border on this side is the edge of the road, with no lane beyond; nan where
+        left_edge: probability that the left border is the edge of the road, with no lane beyond; nan where
             the border is not seen.
+        right_edge: the same for the right one.
         lane_width_m: between the borders; nan if only one of them was seen.
         end_m: from the rear axle along the lane to the stop line or the junction's mouth.
         end: which of the two.

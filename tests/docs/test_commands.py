@@ -31,6 +31,7 @@ EXPENSIVE = {  # parsed only; what runs them instead
     "robustness": "minutes; tests/eval/trials/robustness runs its parts",
     "baselines": "most of an hour; tests/eval/trials/rivals and tests/eval/rivals run short drives",
     "method": "half a minute a method; tests/eval/contest runs its parts",
+    "drive": "a map and missions; tests/eval/drive has one in a tiny town",
     "run": "a drive and a map; tests/eval/real runs small ones",
     "serve": "goes on until it is interrupted; tests/eval/report asks it",
     "gate": "an evaluation a seed; tests/eval/gate judges stored results. `gate --power` is run",

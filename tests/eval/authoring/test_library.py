@@ -11,8 +11,15 @@ from hippodrome.sim.scene.conditions import Conditions
 from hippodrome.sim.self_motion import NOISE_LEVELS
 
 ROOT = Path(__file__).parents[3] / "scenarios"
-FILES = sorted(ROOT.rglob("*.yaml"))
+MISSIONS = sorted((ROOT / "missions").glob("*.yaml"))  # in towns like those of the others
+FILES = sorted(set(ROOT.rglob("*.yaml")) - set(MISSIONS))
 SCENARIOS = {path.stem: read_scenario(path) for path in FILES}
+
+
+def test_missions_are_in_five_towns():
+    missions = [read_scenario(path) for path in MISSIONS]
+    assert [scenario.name for scenario in missions] == [f"missions-{path.stem}" for path in MISSIONS]
+    assert len({scenario.town.model_dump_json() for scenario in missions}) == 5
 
 
 def test_is_a_library():

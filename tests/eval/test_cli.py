@@ -45,7 +45,7 @@ def examples(parser):
 
 
 def test_all_commands_are_walked():
-    assert len(PARSERS) == 1 + 20 + 7
+    assert len(PARSERS) == 1 + 21 + 7
 
 
 @EVERY

@@ -63,6 +63,9 @@ class Belief:
             senses: what else is made of it.
         """
         self._move(distance_m, observation.yaw_rate_radps * observation.dt_s)
+        if self._config.exact_poses:
+            self._take_over(estimate)
+            return
         self._follow_localizer(estimate, distance_m, observation.dt_s)
         self._correct_by_lane(observation, estimate, senses)
 
@@ -72,6 +75,12 @@ class Belief:
         if self._refuted is not None:
             self._refuted = tracks.moved(self._refuted, distance_m, turned_rad)
         self.since_fix_m += distance_m
+
+    def _take_over(self, estimate: LocalizationEstimate) -> None:
+        """Steer by the very pose that was told."""
+        self.track = tracks.begun(estimate.pose, estimate.covariance)
+        if self.plan is not None:
+            self.plan = advanced(self.plan, self.track.pose)
 
     def _follow_localizer(self, estimate: LocalizationEstimate, distance_m: float, dt_s: float) -> None:
         """Begin, correct, or give up the pose that is steered by, as the localizer says."""

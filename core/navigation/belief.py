@@ -19,6 +19,7 @@ from hippodrome.core.types import LocalizationEstimate, LocalizationStatus, Obse
 
 LOOK_EVERY_S = 0.4  # the localizer's pose is taken in so often: its looks are as frequent
 APART_M, APART_SIGMAS, APART_RAD = 4.0, 3.5, 0.5  # the localizer is elsewhere: so far off
+ASIDE_M = 2.2  # or so far to a side, which is another lane: there the lane that is read is the wrong one
 APART_LOOKS = 12  # and for so many looks: what is steered by is the better of the two for a hundred metres without a view
 VOUCHED_LOOKS = 2  # recognised views that a new fix needs beside the localizer's own word
 BACK_ON_MAP_M = 10.0  # driven on the map again before the localizer is believed more than the lanes and dashes
@@ -27,6 +28,7 @@ MISFITS = 3  # readings in a row that contradict the pose across the lane, befor
 AHEAD_M, HALF_BODY_M = (5.0, 13.0), 0.7  # of the path ahead, which must not lead off the road
 OFF_ROAD, OFF_ROAD_FRAMES = 0.3, 3  # share of it that is seen to be no road, in so many frames: the place is wrong ..
 LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehicle may be so much farther on, or less far
+TRUSTED_SHIFT_M = 2.0  # smaller shifts are the ground's own error: borders are seen to half a metre, and always to one side
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
@@ -110,10 +112,13 @@ class Belief:
 
     def _is_elsewhere(self, estimate: LocalizationEstimate, track: Track) -> bool:
         """Whether the localizer believes in another place than the one that is steered by."""
-        apart_m = float(np.hypot(*(estimate.pose[:2] - track.pose[:2])))
+        apart = estimate.pose[:2] - track.pose[:2]
+        aside_m = abs(float(math.cos(track.pose[2]) * apart[1] - math.sin(track.pose[2]) * apart[0]))
+        apart_m = float(np.hypot(*apart))
         turned = abs(math.remainder(float(estimate.pose[2] - track.pose[2]), 2.0 * math.pi))
         sigma_m = track.sigma_m + math.sqrt(max(0.5 * float(np.trace(estimate.covariance[:2, :2])), 0.0))
-        return apart_m > max(APART_M, APART_SIGMAS * sigma_m) or turned > APART_RAD
+        is_far = apart_m > max(APART_M, APART_SIGMAS * sigma_m) or aside_m > max(ASIDE_M, APART_SIGMAS * sigma_m)
+        return is_far or turned > APART_RAD
 
     def _is_refuted(self, estimate: LocalizationEstimate, distance_m: float) -> bool:
         """Whether the localizer still says what was seen to be wrong."""
@@ -167,7 +172,7 @@ class Belief:
         points = np.concatenate([ahead[:, :2] + aside * left for aside in (-HALF_BODY_M, 0.0, HALF_BODY_M)])
         shift_m, share = senses.ground.best_shift_m(points, min(LEAST_SHIFT_M + 2.0 * track.sigma_m, MOST_SHIFT_M))
         self._off_road = self._off_road + 1 if share > OFF_ROAD else 0
-        if shift_m != 0.0 and self._off_road == 0:
+        if abs(shift_m) >= TRUSTED_SHIFT_M and self._off_road == 0:
             self.track, _ = tracks.farther_on(track, shift_m, SHIFT_SIGMA_M)
         if self._off_road >= OFF_ROAD_FRAMES:
             self._refuted, self._refuted_m = tracks.begun(estimate.pose, estimate.covariance), 0.0

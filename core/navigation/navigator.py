@@ -349,7 +349,7 @@ class Navigator:
         """On sight along the border."""
         config, speed = self._config, self._motion.speed_mps
         self._searched_m += speed * dt_s
-        self._search_stood_s = self._search_stood_s + dt_s if speed < 2.0 * config.drive.creep_mps else 0.0
+        self._search_stood_s = self._search_stood_s + dt_s if speed < STANDING_MPS else max(self._search_stood_s - dt_s, 0.0)
         bend = math.tan(self._motion.steering_rad) / config.vehicle.wheelbase_m
         straight_on = int(self._searched_m / ROUND_M) % 2 == 1
         begins = self._searched_m < BEGINS_M
@@ -363,6 +363,7 @@ class Navigator:
             bend,
             straight_on,
             begins,
+            self._search_stood_s,
             config.drive,
             config.vehicle,
         )

@@ -82,7 +82,7 @@ class Navigator:
         self._belief = Belief(config, self._planner, self._side)
         self._health = SensorHealth()
         self._has_goal = False
-        self._standing_s = self._at_goal_s = self._searched_m = 0.0
+        self._standing_s = self._at_goal_s = self._search_stood_s = self._searched_m = 0.0
         self._arrived = False
         self.estimate: LocalizationEstimate | None = None  # the localizer's last answer, for who looks on
 
@@ -151,6 +151,7 @@ class Navigator:
         """On sight along the border."""
         config, speed = self._config, self._senses.motion.speed_mps
         self._searched_m += speed * dt_s
+        self._search_stood_s = self._search_stood_s + dt_s if speed < STANDING_MPS else max(self._search_stood_s - dt_s, 0.0)
         bend = math.tan(self._senses.motion.steering_rad) / config.vehicle.wheelbase_m
         straight_on = int(self._searched_m / ROUND_M) % 2 == 1
         begins = self._searched_m < BEGINS_M
@@ -164,6 +165,7 @@ class Navigator:
             bend,
             straight_on,
             begins,
+            self._search_stood_s,
             config.drive,
             config.vehicle,
         )

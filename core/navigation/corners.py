@@ -94,7 +94,7 @@ def _with_corner(
     now = np.column_stack([path.points_m, path.heading_rad])[rows]
     if _cost(now, _edges(network, lanes), vehicle) <= corner.cost:
         return path
-    u = STEP_M * rows
+    u = STEP_M * rows.astype(np.float64)
     new = _rows_round(network, lanes, corner, u, (begin_m, end_m), at_m, swings_m)
     points, heading, curvature = path.points_m.copy(), path.heading_rad.copy(), path.curvature_1pm.copy()
     mine = np.isfinite(new[:, 0])

@@ -35,6 +35,7 @@ from hippodrome.core.types import CognitiveMap, LocalizationEstimate, Localizati
 
 __all__ = ["Navigator", "NavigatorConfig", "PoseSource"]
 
+BLOCKED = "the street is blocked, and it cannot turn round in it"
 STANDING_MPS = 0.1
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
 OBSTACLE_M = 10.0  # who stands nearer than this before something waits for it
@@ -135,6 +136,8 @@ class Navigator:
             state = DrivingState.HALTED if halt else DrivingState.DOUBTING
             command = replace(command, acceleration_mps2=max(slowed, -3.0), state=state, reason=complaint)
         self._look_for_blockage(radar, command.reason == BARRED, dt_s)
+        if self._standing_s >= self._config.drive.blocked_s and command.state in (DrivingState.DRIVING, DrivingState.DOUBTING):
+            return replace(command, state=DrivingState.HALTED, reason=BLOCKED)
         return command
 
     def _keep_plan(self) -> None:
@@ -215,13 +218,13 @@ class Navigator:
         self._standing_s = self._standing_s + dt_s if standing and waits else 0.0
         if self._belief.plan is None or self._belief.track is None or self._standing_s < self._config.drive.blocked_s:
             return
-        self._standing_s = 0.0
         gate = self._belief.plan.gate()
         if (
             gate is not None
             and gate.edge >= 0
             and gate.entry_u_m - self._belief.plan.u_m < OBSTACLE_M + self._config.vehicle.front_m
         ):
+            self._standing_s = 0.0
             self._planner.close(gate.edge)
             self._belief.plan = self._planner.plan(self._belief.track.pose, 0.0)
             if self._belief.plan is None:

@@ -58,8 +58,6 @@ LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehi
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
-CREEP_AFTER_S = 4.0  # stood without a road ahead and with nobody there, one creeps on
-BEGINS_M = 5.0  # so far the ground beside the vehicle has not been seen yet
 ROUND_M = 250.0  # searched round one block, then straight on to the next ones, and so in turn
 ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
 
@@ -352,7 +350,6 @@ class Navigator:
         self._search_stood_s = self._search_stood_s + dt_s if speed < STANDING_MPS else max(self._search_stood_s - dt_s, 0.0)
         bend = math.tan(self._motion.steering_rad) / config.vehicle.wheelbase_m
         straight_on = int(self._searched_m / ROUND_M) % 2 == 1
-        begins = self._searched_m < BEGINS_M
         step = search_step(
             self._ground,
             self._memory,
@@ -362,7 +359,6 @@ class Navigator:
             speed,
             bend,
             straight_on,
-            begins,
             self._search_stood_s,
             config.drive,
             config.vehicle,

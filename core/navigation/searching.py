@@ -104,18 +104,18 @@ class SearchStep:
 
 def search_step(
     ground: Ground, memory: LaneMemory, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float,
-    bend_1pm: float, straight_on: bool, begins: bool, stood_s: float, config: DriveConfig, vehicle: VehicleShape,
+    bend_1pm: float, straight_on: bool, stood_s: float, config: DriveConfig, vehicle: VehicleShape,
 ) -> SearchStep:  # fmt: skip
     """The next step along the border on the own ``side``: -1 right, +1 left; ``bend_1pm`` is what the vehicle drives now.
 
-    ``straight_on`` passes side streets; with ``begins`` the ground beside the vehicle has not been seen yet.
+    ``straight_on`` passes side streets.
     """
     need_m = max(ROOM_M - ROOM_LESS_MPS * max(stood_s - PATIENT_S, 0.0), LEAST_ROOM_M)
     way = ground.way(bend_1pm, side, memory.beside_m, straight_on, LOOK_M, need_m)
     bends, turned = way.curvature_1pm, way.heading_rad - way.heading_rad[0]
     near = min(int(PREVIEW_S * speed_mps / STEP_M), len(bends) - 1)
     curvature = float(bends[near])
-    straight = begins or bool(np.max(np.abs(turned[: int(STRAIGHT_M / STEP_M)])) < CORNER_RAD)
+    straight = bool(np.max(np.abs(turned[: int(STRAIGHT_M / STEP_M)])) < CORNER_RAD)
     if memory.is_fresh and straight:
         bend, offset_m, heading = memory.curvature_1pm, memory.offset_m, memory.heading_rad
         curvature = lane_curvature_1pm(bend, offset_m, heading, speed_mps, config)

@@ -44,8 +44,8 @@ AROUND = 80  # cells on each side of the vehicle in which the way is looked for:
 SPECK = np.ones((3, 3), dtype=np.uint8)  # fewer cells than that are no border, but the rim of a painted line
 BESIDE = np.ones((5, 5), dtype=np.uint8)  # an edge line lies within two cells of what is no road
 LONGEST_DASH_M = 3.7  # a dash has 3 m
-GAP = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (15, 15))  # a border goes on where it was hidden over so many cells
-STANDS_ON_M = (-1.5, 5.0, 1.3)  # what the car stands on at the start is road: from behind to ahead, and to either side
+GAP_CELLS = 13.0  # a border goes on where it was hidden, over twice so many cells: round a corner the car looks past it
+STANDS_ON_M = (-1.5, 3.9, 1.3)  # what the car stands on at the start is road: from behind to ahead, and to either side
 THICK_PX = 4  # beyond so many more pixels of no road, even that is not sure to be where it seems: hedges and walls stand up
 STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
 UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
@@ -227,7 +227,8 @@ def borders(part: UInt8Array) -> UInt8Array:
         long[0] = False
         edge |= long[label].astype(np.uint8)
     found: UInt8Array = cv2.morphologyEx(other | edge, cv2.MORPH_CLOSE, STRIPES)
-    closed = cv2.morphologyEx(found, cv2.MORPH_CLOSE, GAP) * (part == UNKNOWN)
+    near = (cv2.distanceTransform(1 - found, cv2.DIST_L2, 5) <= GAP_CELLS).astype(np.uint8)
+    closed = (cv2.distanceTransform(near, cv2.DIST_L2, 5) > GAP_CELLS) & (seen_ground(part) == 0)
     return found | closed.astype(np.uint8)
 
 
@@ -303,7 +304,8 @@ def _along_border(
 ) -> FloatArray:
     """The line of equal distance from the border: rows (count, 4) of place, heading, and whether the border was seen.
 
-    A law of steering (Samson) acts on it: round a sharp corner it is an arc, and where the road bends away the border comes nearer ahead.
+    A law of steering (Samson) acts on it: round a sharp corner it is an arc, and where the road bends away the border comes
+    nearer ahead.
     """
     rows = np.zeros((count, 4))
     x, y, heading = pose[0], pose[1], pose[2]

@@ -39,7 +39,13 @@ BLOCKED = "the street is blocked, and it cannot turn round in it"
 STANDING_MPS = 0.1
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
 OBSTACLE_M = 10.0  # who stands nearer than this before something waits for it
-BEGINS_M = 5.0  # so far the ground beside the vehicle has not been seen yet
+MISFITS = 3  # readings in a row that contradict the pose across the lane, before it is loosened
+AHEAD_M, HALF_BODY_M = (5.0, 13.0), 0.7  # of the path ahead, which must not lead off the road
+OFF_ROAD, OFF_ROAD_FRAMES = 0.3, 3  # share of it that is seen to be no road, in so many frames: the place is wrong ..
+LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehicle may be so much farther on, or less far
+REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
+SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
+BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 ROUND_M = 250.0  # searched round one block, then straight on to the next ones, and so in turn
 ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
 
@@ -157,7 +163,6 @@ class Navigator:
         self._search_stood_s = self._search_stood_s + dt_s if speed < STANDING_MPS else max(self._search_stood_s - dt_s, 0.0)
         bend = math.tan(self._senses.motion.steering_rad) / config.vehicle.wheelbase_m
         straight_on = int(self._searched_m / ROUND_M) % 2 == 1
-        begins = self._searched_m < BEGINS_M
         step = search_step(
             self._senses.ground,
             self._senses.memory,
@@ -167,7 +172,6 @@ class Navigator:
             speed,
             bend,
             straight_on,
-            begins,
             self._search_stood_s,
             config.drive,
             config.vehicle,

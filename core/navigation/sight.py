@@ -44,8 +44,9 @@ AROUND = 80  # cells on each side of the vehicle in which the way is looked for:
 SPECK = np.ones((3, 3), dtype=np.uint8)  # fewer cells than that are no border, but the rim of a painted line
 BESIDE = np.ones((5, 5), dtype=np.uint8)  # an edge line lies within two cells of what is no road
 LONGEST_DASH_M = 3.7  # a dash has 3 m
-GAP = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (15, 15))  # a border goes on where it was hidden over so many cells
-STANDS_ON_M = (-1.5, 5.0, 1.3)  # what the car stands on at the start is road: from behind to ahead, and to either side
+STANDING_BENDS_1PM = tuple(0.08 * k for k in range(-4, 5))  # what a car that stands can turn its wheels to
+GAP_CELLS = 13.0  # a border goes on where it was hidden, over twice so many cells: round a corner the car looks past it
+STANDS_ON_M = (-1.5, 3.9, 1.3)  # what the car stands on at the start is road: from behind to ahead, and to either side
 THICK_PX = 4  # beyond so many more pixels of no road, even that is not sure to be where it seems: hedges and walls stand up
 STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
 UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
@@ -152,11 +153,20 @@ class Ground:
         x, y = (grid.ravel() for grid in np.meshgrid(np.arange(back, ahead, 0.1), np.arange(-aside, aside, 0.1)))
         _enter(self._cells, self._origin_m, self.pose, x, y, np.full(len(x), ROAD, dtype=np.uint8))
 
-    def way(self, bend_1pm: float, side: float, beside_m: float, straight_on: bool, length_m: float, need_m: float) -> Way:
+    def way(
+        self,
+        bend_1pm: float,
+        side: float,
+        beside_m: float,
+        straight_on: bool,
+        length_m: float,
+        need_m: float,
+        stands: bool = False,
+    ) -> Way:
         """The way that keeps about ``beside_m`` from the border on one side: +1 left, -1 right; it begins with a curvature.
 
         With ``straight_on`` it passes side streets on that side, and where the road ends it turns to the other side. ``need_m``
-        is the room that the car must have on either side of its middle line.
+        is the room that the car must have on either side of its middle line. A car that ``stands`` may turn its wheels first.
         """
         middle = ((self.pose[:2] - self._origin_m) / CELL_M).astype(np.int64)
         low = np.clip(middle - AROUND, 0, CELLS - 2 * AROUND)
@@ -165,7 +175,11 @@ class Ground:
         field = CELL_M * cv2.distanceTransform(1 - borders(part), cv2.DIST_L2, 5).astype(np.float64)
         corner_m = self._origin_m + CELL_M * low
         line = _along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
-        rows = drivable(field, seen, corner_m, CELL_M, self.pose, bend_1pm, np.ascontiguousarray(line[:, :3]), need_m)
+        bends = sorted(STANDING_BENDS_1PM, key=lambda one: abs(one - bend_1pm)) if stands else [bend_1pm]
+        tried = [
+            drivable(field, seen, corner_m, CELL_M, self.pose, one, np.ascontiguousarray(line[:, :3]), need_m) for one in bends
+        ]
+        rows = max(tried, key=len)
         free_m = sweep.STEP_M * len(rows) if len(rows) < sweep.STEPS else math.inf
         unseen = np.flatnonzero(rows[:, 3] > 0.0)
         seen_m = sweep.STEP_M * float(unseen[0]) if len(unseen) else math.inf
@@ -227,7 +241,8 @@ def borders(part: UInt8Array) -> UInt8Array:
         long[0] = False
         edge |= long[label].astype(np.uint8)
     found: UInt8Array = cv2.morphologyEx(other | edge, cv2.MORPH_CLOSE, STRIPES)
-    closed = cv2.morphologyEx(found, cv2.MORPH_CLOSE, GAP) * (part == UNKNOWN)
+    near = (cv2.distanceTransform(1 - found, cv2.DIST_L2, 5) <= GAP_CELLS).astype(np.uint8)
+    closed = (cv2.distanceTransform(near, cv2.DIST_L2, 5) > GAP_CELLS) & (seen_ground(part) == 0)
     return found | closed.astype(np.uint8)
 
 

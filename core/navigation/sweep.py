@@ -1,4 +1,4 @@
-"""The way that a car can drive: of all that its turning circle and wheels allow, the one nearest to a line, clear of borders.
+"""The way that a car can drive: of all that its turning circle and wheels allow, the one nearest to a line and clear of borders.
 
 A beam search over curvatures: step by step each way that is kept is continued with every change of curvature that the wheels can
 make, ways whose swept body touches a border are dropped, and of ways that are at the same place only the best is kept.
@@ -20,7 +20,7 @@ UNIT_1PM = 0.02  # of curvature
 MOST_UNITS = 16  # a little less than the turning circle
 CHANGES = np.array([0, -1, 1, -3, 3, -7, 7])  # of curvature in a step; a car at walking pace turns its wheels so fast
 COMFORT_M = 1.25  # from the car's middle line to a border; nearer costs
-ROOM_WEIGHT, HEADING_WEIGHT, CHANGE_WEIGHT, UNSEEN_COST = 6.0, 1.5, 8.0, 0.5
+ROOM_WEIGHT, HEADING_WEIGHT, CHANGE_WEIGHT, UNSEEN_COST = 6.0, 1.5, 8.0, 0.8
 BODY_M = np.array([0.0, 1.35, 2.7, 3.4])  # points of the middle line that are kept clear, ahead of the rear axle ..
 BODY_LESS_M = np.array([0.0, 0.0, 0.0, 0.35])  # .. and how much nearer to a border they may be: the bumper is rounded
 WHEELS_M = np.array([[0.0, -0.9], [0.0, 0.9], [2.7, -0.9], [2.7, 0.9]])  # where the ground should have been seen
@@ -55,7 +55,7 @@ def room_m(field: FloatArray, corner: FloatArray, cell_m: float, x: float, y: fl
 @njit(cache=True)
 def _is_unseen(cells: UInt8Array, corner: FloatArray, cell_m: float, x: float, y: float) -> bool:
     i, j = math.floor((x - corner[0]) / cell_m), math.floor((y - corner[1]) / cell_m)
-    return i < 0 or j < 0 or i >= cells.shape[0] or j >= cells.shape[1] or cells[i, j] == 0
+    return bool(i < 0 or j < 0 or i >= cells.shape[0] or j >= cells.shape[1] or cells[i, j] == 0)
 
 
 @njit(cache=True)

@@ -240,15 +240,16 @@ def borders(part: UInt8Array) -> UInt8Array:
         long = extent > LONGEST_DASH_M
         long[0] = False
         edge |= long[label].astype(np.uint8)
-    found: UInt8Array = cv2.morphologyEx(other | edge, cv2.MORPH_CLOSE, STRIPES)
+    found: UInt8Array = cv2.morphologyEx(other | edge, cv2.MORPH_CLOSE, STRIPES).astype(np.uint8)
     near = (cv2.distanceTransform(1 - found, cv2.DIST_L2, 5) <= GAP_CELLS).astype(np.uint8)
     closed = (cv2.distanceTransform(near, cv2.DIST_L2, 5) > GAP_CELLS) & (seen_ground(part) == 0)
-    return found | closed.astype(np.uint8)
+    both: UInt8Array = found | closed.astype(np.uint8)
+    return both
 
 
 def seen_ground(part: UInt8Array) -> UInt8Array:
     """1 where cells (n, m) have been seen, or lie between the rows of pixels of a frame."""
-    seen: UInt8Array = cv2.morphologyEx((part != UNKNOWN).astype(np.uint8), cv2.MORPH_CLOSE, STRIPES)
+    seen: UInt8Array = cv2.morphologyEx((part != UNKNOWN).astype(np.uint8), cv2.MORPH_CLOSE, STRIPES).astype(np.uint8)
     return seen
 
 

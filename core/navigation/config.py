@@ -13,6 +13,7 @@ class VehicleShape:
     """The vehicle that is driven: a compact car."""
 
     wheelbase_m: float = 2.7
+    half_track_m: float = 0.8  # from the middle to the outer face of a tyre
     front_m: float = 3.6  # from the rear axle to the front bumper
     max_steering_rad: float = 0.733  # of the road wheels: 42 degrees
     max_acceleration_mps2: float = 4.0
@@ -52,7 +53,7 @@ class DriveConfig:
     creep_mps: float = 1.2
     error_decay_m: float = 3.0  # distance over which an offset from the path fades at low speed
     error_decay_s: float = 0.6  # and the time it takes at least
-    preview_s: float = 0.3  # steering looks ahead by about its own delay
+    preview_s: float = 0.2  # steering looks ahead by about its own delay
     speed_gain_1ps: float = 1.5
     headway_s: float = 1.4  # of the intelligent driver model (Treiber, Hennecke and Helbing, 2000)
     jam_gap_m: float = 2.5  # and its gap at rest
@@ -86,4 +87,5 @@ class NavigatorConfig:
     plan: PlanConfig = field(default_factory=PlanConfig)
     drive: DriveConfig = field(default_factory=DriveConfig)
     watch: WatchConfig = field(default_factory=WatchConfig)
+    exact_poses: bool = False  # for upper bounds: what tells the pose is taken at its word, and nothing else corrects it
     read_road: bool = True  # whether the lane is read from the frames; False: only the localizer's pose counts

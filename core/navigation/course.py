@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hippodrome.core.navigation.config import DriveConfig
+from hippodrome.core.navigation.config import DriveConfig, VehicleShape
+from hippodrome.core.navigation.corners import with_corners
 from hippodrome.core.navigation.types import Indicator
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.roads.paths import STEP_M, Path, Piece, piece_of_samples, piece_starts, smooth_path
@@ -47,9 +48,17 @@ class Course:
         return STEP_M * (len(self.lane) - 1)
 
 
-def make_course(network: RoadNetwork, pieces: Sequence[Piece], goal_lane: int, goal_m: float, config: DriveConfig) -> Course:
+def make_course(
+    network: RoadNetwork,
+    pieces: Sequence[Piece],
+    goal_lane: int,
+    goal_m: float,
+    config: DriveConfig,
+    vehicle: VehicleShape,
+) -> Course:
     """The course over the stretches of lanes of a route that ends at or beyond the goal."""
-    path, starts, owner = smooth_path(network, pieces, look_ahead_m=TURN_IN_M), piece_starts(pieces), piece_of_samples(pieces)
+    starts, owner = piece_starts(pieces), piece_of_samples(pieces)
+    path = with_corners(network, pieces, smooth_path(network, pieces, look_ahead_m=TURN_IN_M), vehicle)
     begin_m = np.array([piece.begin_m for piece in pieces])
     lanes = np.array([piece.lane for piece in pieces], dtype=np.int32)
     u = STEP_M * np.arange(len(owner))

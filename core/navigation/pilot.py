@@ -93,7 +93,7 @@ class RoutePlanner:
         if not pieces:
             return None
         goal = self._goal
-        course = make_course(self._network, pieces, goal.lane, goal.position_m, self._config.drive)
+        course = make_course(self._network, pieces, goal.lane, goal.position_m, self._config.drive, self._config.vehicle)
         u_m = place.position_m - pieces[0].begin_m if pieces[0].lane == place.lane else 0.0
         return Plan(course, place_on(course, pose, min(max(u_m, 0.0), course.last_u_m)))
 

@@ -15,19 +15,25 @@ from hippodrome.core.navigation.speed import stopping_mps
 from hippodrome.core.navigation.steering import lane_curvature_1pm
 from hippodrome.core.navigation.types import Indicator, Radar
 from hippodrome.core.reading.types import LaneEnd, RoadReading
+from hippodrome.core.types import FloatArray
 
 KERB_M = 1.6  # from what is no road to the middle of such a lane
 BESIDE_M = 1.35  # from the edge line to the middle of a lane of 3.2 m whose line is painted inside of the border
 PREVIEW_S = 0.25  # the wheels take their time to turn
+SPAN = 4  # samples of the way over which the rate of its curvature is taken
 LOOK_M = 14.0  # of the way ahead
 CORNER_RAD = 0.3  # a way that has turned so much goes round a corner
 BESIDE_RANGE_M = (0.9, 1.9)  # what that distance can be
 FRESH_M = 2.5  # a lane that was read is steered by for so long
 FORGOTTEN_M = 8.0  # after so long without a reading, any reading is believed
 JUMP_M = 0.6  # readings that differ by more are of different lanes
-STRAIGHT_M = 6.0  # without a corner so far ahead, the lane that is read is steered by, and not the border
+STRAIGHT_M, AGREES_RAD = 6.0, 0.15  # the lane that was read is steered by where the way turns as it does, so far ahead
 CREEP_GAP_M = 4.0
-FREE_MARGIN_M = -1.5  # the way along the border cuts corners of what is no road by a cell or two
+STOP_SHORT_M = 0.8  # of the end of the way that can be driven
+ROOM_M, LEAST_ROOM_M = 0.95, 0.3  # of the car's middle line on either side: its wheels reach .8 m
+PATIENT_S, ROOM_LESS_MPS = 3.0, 0.1  # who stands longer without a way takes less room, rather than stand for ever
+STOOD_S, STANDS_MPS, TURNED_RAD = 0.5, 0.3, 0.1  # who has stood so long turns the wheels before going on
+WHEEL_RATE_RADPS = 0.6  # at which a way's curvature is followed; the wheels can do .9
 SEARCH_LATERAL = 0.6  # of the lateral acceleration: corners that nobody knows are taken slowly
 BLIND_M = 5.0  # the way is driven so far without a border beside it, at walking pace
 SURE_M2 = 0.03  # variance of an offset in the lane that is steered by
@@ -99,27 +105,32 @@ class SearchStep:
 
 def search_step(
     ground: Ground, memory: LaneMemory, reading: RoadReading | None, radar: Radar, side: float, speed_mps: float,
-    bend_1pm: float, straight_on: bool, begins: bool, config: DriveConfig, vehicle: VehicleShape,
+    bend_1pm: float, straight_on: bool, stood_s: float, config: DriveConfig, vehicle: VehicleShape,
 ) -> SearchStep:  # fmt: skip
     """The next step along the border on the own ``side``: -1 right, +1 left; ``bend_1pm`` is what the vehicle drives now.
 
-    ``straight_on`` passes side streets; with ``begins`` the ground beside the vehicle has not been seen yet.
+    ``straight_on`` passes side streets.
     """
-    way = ground.way(bend_1pm, side, KERB_M, straight_on, LOOK_M)
+    stands = stood_s > STOOD_S and speed_mps < STANDS_MPS
+    need_m = max(ROOM_M - ROOM_LESS_MPS * max(stood_s - PATIENT_S, 0.0), LEAST_ROOM_M)
+    way = ground.way(bend_1pm, side, memory.beside_m, straight_on, LOOK_M, need_m, stands)
     bends, turned = way.curvature_1pm, way.heading_rad - way.heading_rad[0]
     near = min(int(PREVIEW_S * speed_mps / STEP_M), len(bends) - 1)
     curvature = float(bends[near])
-    straight = begins or bool(np.max(np.abs(turned[: int(STRAIGHT_M / STEP_M)])) < CORNER_RAD)
-    if memory.is_fresh and straight:
+    in_lane = memory.is_fresh and _agrees(memory, turned[: int(STRAIGHT_M / STEP_M)])
+    if in_lane:
         bend, offset_m, heading = memory.curvature_1pm, memory.offset_m, memory.heading_rad
         curvature = lane_curvature_1pm(bend, offset_m, heading, speed_mps, config)
     wanted, reason = config.search_mps, "looks for known ground"
-    first_m = STRAIGHT_M if memory.is_fresh and straight else 0.0  # up to there the lane is driven, and not the border
-    ahead = np.abs(bends[int(first_m / STEP_M) :])
+    first_m = STRAIGHT_M if in_lane else 0.0  # up to there the lane is driven, and not the border
+    ahead = np.abs(bends[min(int(first_m / STEP_M), len(bends) - 1) :])
     braking = 2.0 * config.braking_mps2 * (first_m + STEP_M * np.arange(len(ahead)))
     wanted = min(wanted, float(np.min(np.sqrt(SEARCH_LATERAL * config.lateral_mps2 / np.maximum(ahead, 1e-3) + braking))))
+    wanted = min(wanted, _wheels_mps(bends, bend_1pm, config, vehicle))
+    if way.seen_m < LOOK_M:
+        wanted = min(wanted, max(stopping_mps(way.seen_m, config.braking_mps2), config.creep_mps))
     if way.free_m < LOOK_M:
-        ahead_mps = stopping_mps(way.free_m - vehicle.front_m - FREE_MARGIN_M, config.braking_mps2)
+        ahead_mps = stopping_mps(way.free_m - STOP_SHORT_M, config.braking_mps2)
         wanted, reason = (ahead_mps, "sees no road ahead") if ahead_mps < wanted else (wanted, reason)
     if not np.any(way.seen[: int(BLIND_M / STEP_M)]):
         wanted, reason = min(wanted, config.creep_mps), "sees no border of the road"
@@ -129,8 +140,24 @@ def search_step(
         slowed, why = config.search_mps / 2.0, "a junction is ahead"
     if slowed < wanted:
         wanted, reason = slowed, why
+    if stands and abs(math.atan(vehicle.wheelbase_m * curvature) - math.atan(vehicle.wheelbase_m * bend_1pm)) > TURNED_RAD:
+        wanted, reason = 0.0, "turns its wheels"
     may_creep = not why and radar.gap_m > CREEP_GAP_M
     return SearchStep(curvature, wanted, indicated(float(turned[-1])), reason, may_creep)
+
+
+def _agrees(memory: LaneMemory, turned_rad: FloatArray) -> bool:
+    """Whether the lane goes where the way goes, which has turned by (n,) angles, ``STEP_M`` apart."""
+    lane_rad = memory.curvature_1pm * STEP_M * np.arange(1, len(turned_rad) + 1) - memory.heading_rad
+    return bool(np.max(np.abs(turned_rad - lane_rad)) < AGREES_RAD)
+
+
+def _wheels_mps(bends_1pm: FloatArray, bend_1pm: float, config: DriveConfig, vehicle: VehicleShape) -> float:
+    """The highest speed now at which the wheels can be turned as the way wants, braking in time before where they turn fast."""
+    angle = np.arctan(vehicle.wheelbase_m * np.concatenate([[bend_1pm], bends_1pm]))
+    rate = np.abs(angle[SPAN:] - angle[:-SPAN]) / (SPAN * STEP_M)
+    most = np.maximum(WHEEL_RATE_RADPS / np.maximum(rate, 1e-3), config.creep_mps)
+    return float(np.min(np.sqrt(most**2 + 2.0 * config.braking_mps2 * STEP_M * np.arange(len(rate))), initial=config.search_mps))
 
 
 def _to_stop_m(turned_rad: np.ndarray, reading: RoadReading | None, vehicle: VehicleShape) -> float:

@@ -17,6 +17,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from hippodrome.core.navigation import sweep
+from hippodrome.core.navigation.sweep import distance_at, drivable
 from hippodrome.core.types import FloatArray, Frame, UInt8Array
 from hippodrome.core.views.odometry import CameraGeometry
 
@@ -36,19 +38,24 @@ SHIFT_STEP_M = 0.5
 STEP_M = 0.25  # of the way along the border
 REACH_M = 3.4  # how far aside the border is looked for
 NEAR_M = 0.5  # ahead of the rear axle, where the distance to the paint is measured
-AHEAD_M = 1.0  # ahead of the rear axle, where the line of equal distance from the border is followed
+AHEAD_M = 0.5  # ahead of the rear axle, where the line of equal distance from the border is followed
 SLOPE_M = 0.3  # over which the direction of the border is taken
 AROUND = 80  # cells on each side of the vehicle in which the way is looked for: 16 m
 SPECK = np.ones((3, 3), dtype=np.uint8)  # fewer cells than that are no border, but the rim of a painted line
+BESIDE = np.ones((5, 5), dtype=np.uint8)  # an edge line lies within two cells of what is no road
+LONGEST_DASH_M = 3.7  # a dash has 3 m
+STANDING_BENDS_1PM = tuple(0.08 * k for k in range(-4, 5))  # what a car that stands can turn its wheels to
+GAP_CELLS = 13.0  # a border goes on where it was hidden, over twice so many cells: round a corner the car looks past it
+STANDS_ON_M = (-1.5, 3.9, 1.3)  # what the car stands on at the start is road: from behind to ahead, and to either side
+THICK_PX = 4  # beyond so many more pixels of no road, even that is not sure to be where it seems: hedges and walls stand up
 STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
 UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
 OTHER_SIDE_1PM = 0.12  # and more so where the other side of the road is nearest
 MOST_TURN_RAD = 1.9
 RECEDES_RAD, STRAIGHT_ON_M = 0.25, 0.2  # a border that leads away by so much is a side street's, for who goes straight on
-LEAST_ROOM_M = 0.5  # nearer to what is no road no wheel has room
-DECAY_M = 2.6  # distance over which an offset from the way fades
-TIGHTEST_1PM = 0.29  # a little less than the turning circle
-BEND_PER_STEP = 0.07
+DECAY_M = 1.6  # distance over which an offset from the way fades
+TIGHTEST_1PM = 0.6  # of the line, which no car could drive round a sharp corner
+BEND_PER_STEP = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,6 +86,7 @@ class Way:
     heading_rad: FloatArray
     seen: FloatArray  # 1 where the border was found beside the sample, 0 where it was not
     free_m: float  # length of the way up to something that is no road
+    seen_m: float  # length of the way up to ground that has not been seen yet
 
 
 class Ground:
@@ -115,6 +123,7 @@ class Ground:
         """Enter a frame; what lies beyond the next vehicle ahead, ``gap_m`` from the bumper, is hidden."""
         if self._view is None or self._view.ahead_m.shape[1] != frame.shape[1]:
             self._view = ground_view(self._camera, frame.shape[1], frame.shape[0])
+            self._stand()
         view = self._view
         part = frame[view.rows].astype(np.float32)
         level = part.mean(axis=2) if part.ndim == 3 else part
@@ -131,27 +140,52 @@ class Ground:
             kind[(relative > PAINT_LEVEL) & (colour < COLOURFUL)] = PAINT
         else:
             kind[relative > PAINT_LEVEL] = PAINT
-        kind[_hidden(kind) & (kind != OTHER)] = UNKNOWN
+        hidden = _hidden(kind)
+        kind[hidden & (kind != OTHER)] = UNKNOWN
+        kind[:-THICK_PX][hidden[THICK_PX:]] = UNKNOWN
         reach = min(FAR_M + self._camera.forward_m, gap_m + 2.6)
         near = (view.ahead_m < reach) & (kind != UNKNOWN)
         _enter(self._cells, self._origin_m, self.pose, view.ahead_m[near], view.left_m[near], kind[near])
 
-    def way(self, bend_1pm: float, side: float, beside_m: float, straight_on: bool, length_m: float) -> Way:
-        """The way that keeps ``beside_m`` from what is no road on one side: +1 left, -1 right; it begins with a curvature.
+    def _stand(self) -> None:
+        """Enter the ground below the car, which no frame has shown."""
+        back, ahead, aside = STANDS_ON_M
+        x, y = (grid.ravel() for grid in np.meshgrid(np.arange(back, ahead, 0.1), np.arange(-aside, aside, 0.1)))
+        _enter(self._cells, self._origin_m, self.pose, x, y, np.full(len(x), ROAD, dtype=np.uint8))
 
-        With ``straight_on`` it passes side streets on that side, and where the road ends it turns to the other side.
+    def way(
+        self,
+        bend_1pm: float,
+        side: float,
+        beside_m: float,
+        straight_on: bool,
+        length_m: float,
+        need_m: float,
+        stands: bool = False,
+    ) -> Way:
+        """The way that keeps about ``beside_m`` from the border on one side: +1 left, -1 right; it begins with a curvature.
+
+        With ``straight_on`` it passes side streets on that side, and where the road ends it turns to the other side. ``need_m``
+        is the room that the car must have on either side of its middle line. A car that ``stands`` may turn its wheels first.
         """
         middle = ((self.pose[:2] - self._origin_m) / CELL_M).astype(np.int64)
         low = np.clip(middle - AROUND, 0, CELLS - 2 * AROUND)
-        part = self._cells[low[0] : low[0] + 2 * AROUND, low[1] : low[1] + 2 * AROUND]
-        other = (part == OTHER).astype(np.uint8)
-        other = cv2.morphologyEx(cv2.morphologyEx(other, cv2.MORPH_OPEN, SPECK), cv2.MORPH_CLOSE, STRIPES)
-        field = CELL_M * cv2.distanceTransform(1 - other, cv2.DIST_L2, 5).astype(np.float64)
+        part = np.ascontiguousarray(self._cells[low[0] : low[0] + 2 * AROUND, low[1] : low[1] + 2 * AROUND])
+        seen = seen_ground(part)
+        field = CELL_M * cv2.distanceTransform(1 - borders(part), cv2.DIST_L2, 5).astype(np.float64)
         corner_m = self._origin_m + CELL_M * low
-        rows = _along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
-        blocked = np.flatnonzero(rows[:, 3] < LEAST_ROOM_M)
-        free_m = STEP_M * float(blocked[0] if len(blocked) else len(rows))
-        return Way(rows[:, 0], rows[:, 1], rows[:, 2], free_m)
+        line = _along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
+        bends = sorted(STANDING_BENDS_1PM, key=lambda one: abs(one - bend_1pm)) if stands else [bend_1pm]
+        tried = [
+            drivable(field, seen, corner_m, CELL_M, self.pose, one, np.ascontiguousarray(line[:, :3]), need_m) for one in bends
+        ]
+        rows = max(tried, key=len)
+        free_m = sweep.STEP_M * len(rows) if len(rows) < sweep.STEPS else math.inf
+        unseen = np.flatnonzero(rows[:, 3] > 0.0)
+        seen_m = sweep.STEP_M * float(unseen[0]) if len(unseen) else math.inf
+        fine = rows if len(rows) else np.array([[bend_1pm, self.pose[2], 0.0, 0.0]])
+        fine = np.repeat(fine, int(sweep.STEP_M / STEP_M), axis=0)
+        return Way(fine[:, 0], fine[:, 1], line[:, 3], free_m, seen_m)
 
     def border_m(self, side: float) -> float:
         """Distance from the vehicle's line of travel to the border on one side, just ahead of the rear axle; nan if unknown."""
@@ -188,6 +222,35 @@ class Ground:
         kind = self._cells[i[inside], j[inside]]
         known = kind != UNKNOWN
         return float(np.mean(kind[known] == OTHER)) if known.any() else 0.0
+
+
+def borders(part: UInt8Array) -> UInt8Array:
+    """1 where cells (n, m) are what the car must not drive on: what is no road, and the painted lines at its edges.
+
+    A line is an edge's if it is thin and longer than any dash, or lies beside what is no road. Stop lines are thick.
+    """
+    other = cv2.morphologyEx((part == OTHER).astype(np.uint8), cv2.MORPH_OPEN, SPECK)
+    paint = (part == PAINT).astype(np.uint8)
+    thick = cv2.dilate(cv2.morphologyEx(paint, cv2.MORPH_OPEN, SPECK), SPECK)
+    thin = paint * (1 - thick)
+    edge = thin * cv2.dilate(other, BESIDE)
+    count, label, stats, _ = cv2.connectedComponentsWithStats(thin, connectivity=8)
+    if count > 1:
+        extent = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) * CELL_M
+        long = extent > LONGEST_DASH_M
+        long[0] = False
+        edge |= long[label].astype(np.uint8)
+    found: UInt8Array = cv2.morphologyEx(other | edge, cv2.MORPH_CLOSE, STRIPES).astype(np.uint8)
+    near = (cv2.distanceTransform(1 - found, cv2.DIST_L2, 5) <= GAP_CELLS).astype(np.uint8)
+    closed = (cv2.distanceTransform(near, cv2.DIST_L2, 5) > GAP_CELLS) & (seen_ground(part) == 0)
+    both: UInt8Array = found | closed.astype(np.uint8)
+    return both
+
+
+def seen_ground(part: UInt8Array) -> UInt8Array:
+    """1 where cells (n, m) have been seen, or lie between the rows of pixels of a frame."""
+    seen: UInt8Array = cv2.morphologyEx((part != UNKNOWN).astype(np.uint8), cv2.MORPH_CLOSE, STRIPES).astype(np.uint8)
+    return seen
 
 
 def _hidden(kind: UInt8Array) -> NDArray[np.bool_]:
@@ -244,19 +307,6 @@ def _border_m(cells: UInt8Array, origin: FloatArray, x: float, y: float, heading
 
 
 @njit(cache=True)
-def _distance_at(field: FloatArray, corner: FloatArray, x: float, y: float) -> float:
-    """The distance field between its cells' middles; far away beyond its rim."""
-    u, v = (x - corner[0]) / CELL_M - 0.5, (y - corner[1]) / CELL_M - 0.5
-    i, j = math.floor(u), math.floor(v)
-    if i < 0 or j < 0 or i >= field.shape[0] - 1 or j >= field.shape[1] - 1:
-        return 2.0 * REACH_M
-    p, q = u - i, v - j
-    low = (1.0 - q) * field[i, j] + q * field[i, j + 1]
-    high = (1.0 - q) * field[i + 1, j] + q * field[i + 1, j + 1]
-    return float((1.0 - p) * low + p * high)
-
-
-@njit(cache=True)
 def _along_border(
     field: FloatArray,
     corner: FloatArray,
@@ -267,19 +317,19 @@ def _along_border(
     straight_on: bool,
     count: int,
 ) -> FloatArray:
-    """The way: rows (count, 4) of curvature, heading, whether the border was seen, and the distance to what is no road.
+    """The line of equal distance from the border: rows (count, 4) of place, heading, and whether the border was seen.
 
-    The vehicle's law of steering (Samson) acts on the line of equal distance from the border: round a sharp corner that line is
-    an arc, and where the road bends away the border comes nearer ahead.
+    A law of steering (Samson) acts on it: round a sharp corner it is an arc, and where the road bends away the border comes
+    nearer ahead.
     """
     rows = np.zeros((count, 4))
     x, y, heading = pose[0], pose[1], pose[2]
     for k in range(count):
         cos, sin = math.cos(heading), math.sin(heading)
         px, py = x + AHEAD_M * cos, y + AHEAD_M * sin
-        d = _distance_at(field, corner, px, py)
-        gx = _distance_at(field, corner, px + SLOPE_M, py) - _distance_at(field, corner, px - SLOPE_M, py)
-        gy = _distance_at(field, corner, px, py + SLOPE_M) - _distance_at(field, corner, px, py - SLOPE_M)
+        d = distance_at(field, corner, CELL_M, px, py)
+        gx = distance_at(field, corner, CELL_M, px + SLOPE_M, py) - distance_at(field, corner, CELL_M, px - SLOPE_M, py)
+        gy = distance_at(field, corner, CELL_M, px, py + SLOPE_M) - distance_at(field, corner, CELL_M, px, py - SLOPE_M)
         seen = d < REACH_M and gx * gx + gy * gy > 1e-6
         wanted = 0.0 if straight_on else side * UNSEEN_1PM
         if seen:
@@ -294,9 +344,8 @@ def _along_border(
                 wanted = side * OTHER_SIDE_1PM
         wanted = min(max(wanted, -TIGHTEST_1PM), TIGHTEST_1PM)
         bend += min(max(wanted - bend, -BEND_PER_STEP), BEND_PER_STEP)
-        rows[k, 0], rows[k, 1] = bend, heading
-        rows[k, 2] = 1.0 if seen else 0.0
-        rows[k, 3] = _distance_at(field, corner, x, y)
+        rows[k, 0], rows[k, 1], rows[k, 2] = x, y, heading
+        rows[k, 3] = 1.0 if seen else 0.0
         x, y = x + STEP_M * cos, y + STEP_M * sin
         heading += STEP_M * bend
     return rows

@@ -54,7 +54,7 @@ def navigator_config(scenario: Scenario, row: RowSpec) -> NavigatorConfig:
     camera = scenario.camera
     localizer = scenario.localizer if row.mode is None else replace(scenario.localizer, mode=row.mode)
     geometry = CameraGeometry(fov_deg=camera.fov_deg, height_m=camera.height_m, forward_m=camera.forward_m)
-    return NavigatorConfig(localizer=localizer, camera=geometry, read_road=row.read_road)
+    return NavigatorConfig(localizer=localizer, camera=geometry, read_road=row.read_road, exact_poses=row.pose == "truth")
 
 
 class KnownPose(PoseSource):

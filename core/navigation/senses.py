@@ -1,0 +1,91 @@
+"""What is sensed, put together: the own motion in metres, the lane and its lines, the ground about the vehicle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hippodrome.core.navigation import motion as motions
+from hippodrome.core.navigation.config import NavigatorConfig
+from hippodrome.core.navigation.dashes import LEAST_M, MOST_M, LineView, driven_m, line_levels
+from hippodrome.core.navigation.searching import LaneMemory, remembered
+from hippodrome.core.navigation.sight import Ground
+from hippodrome.core.navigation.types import Radar
+from hippodrome.core.reading.reader import RoadReader
+from hippodrome.core.reading.types import RoadReading
+from hippodrome.core.types import Observation
+
+
+class Senses:
+    """What the vehicle knows without a map.
+
+    Args:
+        config: all parameters.
+        side: 1 where traffic keeps left, -1 where it keeps right.
+        expected_scale: metres per unit of the odometry, before anything was sensed.
+    """
+
+    def __init__(self, config: NavigatorConfig, side: float, expected_scale: float) -> None:
+        self._config, self._side, self._expected_scale = config, side, expected_scale
+        self._reader: RoadReader | None = None
+        self._line: LineView | None = None
+        self._since_frame = np.zeros(2)  # metres and rad
+        self.ground = Ground(config.camera)
+        self.motion = motions.Motion()
+        self.reading: RoadReading | None = None  # of this step's frame
+        self.memory = LaneMemory()
+
+    def step(self, observation: Observation, radar: Radar, told_scale: float | None) -> float:
+        """Take an observation in: the metres that were driven. ``told_scale`` is the localizer's, where it knows the place."""
+        distance_m = self._move(observation, radar, told_scale)
+        self._read(observation, distance_m)
+        return distance_m
+
+    def _move(self, observation: Observation, radar: Radar, told_scale: float | None) -> float:
+        """Take the self-motion in: the metres that were driven."""
+        if told_scale is not None:
+            self.motion = motions.told(self.motion, told_scale, self.motion.speed_mps * observation.dt_s)
+        scale = self.motion.metres_per_unit(self._expected_scale)
+        self.motion = motions.sensed(self.motion, observation, scale, self._config.vehicle)
+        distance_m = scale * observation.speed * observation.dt_s
+        self.ground.move(distance_m, observation.yaw_rate_radps * observation.dt_s)
+        if observation.frame is not None:
+            self.ground.see(observation.frame, radar.gap_m)
+        return distance_m
+
+    def _read(self, observation: Observation, distance_m: float) -> None:
+        """Read the lane in a new frame; between frames there is no reading."""
+        self.reading = None
+        self._since_frame = self._since_frame + np.array([distance_m, observation.yaw_rate_radps * observation.dt_s])
+        if observation.frame is not None and self._config.read_road:
+            if self._reader is None:
+                size_px = observation.frame.shape[1], observation.frame.shape[0]
+                self._reader = RoadReader(self._config.camera.on_road(*size_px))
+            self.reading = self._reader.read(observation.frame, *self._since_frame.tolist())
+            self._since_frame = np.zeros(2)
+        turned_rad = observation.yaw_rate_radps * observation.dt_s
+        border_m = self.ground.border_m(self._side)
+        self.memory = remembered(self.memory, self.reading, distance_m, turned_rad, border_m, self._side)
+        self._see_dashes(observation)
+
+    def _see_dashes(self, observation: Observation) -> None:
+        """Let the dashes of the centre line tell the scale, as long as no view does."""
+        units = observation.speed * observation.dt_s
+        if self._line is not None:
+            self._line = LineView(self._line.levels, self._line.units + units)
+        memory = self.memory
+        if observation.frame is None or not memory.is_fresh:
+            return
+        levels = line_levels(
+            observation.frame, self._config.camera, memory.offset_m, memory.heading_rad, memory.curvature_1pm, -self._side
+        )
+        scale = self.motion.metres_per_unit(self._expected_scale)
+        line = self._line
+        if line is not None and scale * line.units < LEAST_M:
+            return
+        if line is not None and scale * line.units < MOST_M:
+            metres = driven_m(line.levels, levels, scale * line.units)
+            if math.isfinite(metres):
+                self.motion = motions.seen(self.motion, metres, line.units)
+        self._line = LineView(levels, 0.0)

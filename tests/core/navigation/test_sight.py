@@ -1,0 +1,104 @@
+"""In search: what counts as a border of the road, and the way that a car can drive along it."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from hippodrome.core.navigation.sight import OTHER, PAINT, ROAD, UNKNOWN, Ground, borders
+from hippodrome.core.navigation.sweep import STEP_M, STEPS, drivable
+from hippodrome.core.views.odometry import CameraGeometry
+
+CELL_M = 0.2
+CORNER = np.zeros(2)
+
+
+def cells():
+    return np.full((160, 160), ROAD, dtype=np.uint8)
+
+
+def field_of(barrier):
+    return CELL_M * cv2.distanceTransform(1 - barrier.astype(np.uint8), cv2.DIST_L2, 5).astype(np.float64)
+
+
+def driven(rows, pose):
+    """Poses of the rear axle along rows of curvatures."""
+    x, y, heading = pose
+    poses = []
+    for bend in rows[:, 0]:
+        chord = heading + 0.5 * bend * STEP_M
+        x, y, heading = x + STEP_M * math.cos(chord), y + STEP_M * math.sin(chord), heading + bend * STEP_M
+        poses.append((x, y, heading))
+    return np.array(poses)
+
+
+def straight_line(y=8.0):
+    return np.stack([np.arange(60) * 0.25 + 4.0, np.full(60, y), np.zeros(60)], axis=1)
+
+
+def test_edge_lines_are_borders_and_dashes_and_stop_lines_are_none():
+    part = cells()
+    part[:, 20] = PAINT  # along the whole road
+    part[10:25, 36] = PAINT  # a dash of 3 m
+    part[100:104, 21:36] = PAINT  # a stop line
+    part[40:50, 52] = PAINT  # a short piece beside ..
+    part[:, 53:] = OTHER  # .. what is no road
+    found = borders(part)
+    assert found[:, 20].all() and found[40:50, 52].all() and found[:, 60].all()
+    assert not found[:, 30:50].any() and not found[101, 25:35].any()
+
+
+def test_a_border_goes_on_where_it_was_hidden():
+    part = cells()
+    part[:, 40] = PAINT
+    part[:, 41:] = OTHER
+    part[66:74, 38:] = UNKNOWN
+    assert borders(part)[70, 41:44].any()
+
+
+def test_the_way_keeps_to_the_line():
+    rows = drivable(field_of(cells() == OTHER), cells(), CORNER, CELL_M, np.array([4.0, 8.5, 0.0]), 0.0, straight_line(), 0.95)
+    poses = driven(rows, (4.0, 8.5, 0.0))
+    assert len(rows) == STEPS and abs(poses[-1, 1] - 8.0) < 0.15 and abs(poses[-1, 2]) < 0.1
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_round_a_corner_without_a_radius_no_wheel_leaves_the_road(side):
+    barrier = np.zeros((160, 160), dtype=np.uint8)
+    corner, border = 60, 80  # the road leads along x, beside a border from which on another one leads aside
+    lower = slice(0, border) if side < 0.0 else slice(border, None)
+    barrier[:corner, lower] = 1
+    middle = border * CELL_M - side * 1.4
+    before = [(x, middle, 0.0) for x in np.arange(4.0, corner * CELL_M, 0.25)]
+    turns = side * np.arange(0.0, 0.5 * math.pi, 0.25 / 1.4)
+    arc = [(corner * CELL_M + 1.4 * abs(math.sin(a)), middle + side * 1.4 * (1.0 - math.cos(a)), a) for a in turns]
+    after = [(corner * CELL_M + 1.4, border * CELL_M + side * s, side * 0.5 * math.pi) for s in np.arange(0.0, 10.0, 0.25)]
+    line, field = np.array(before + arc + after), field_of(barrier)
+    pose, bend = np.array([6.0, middle, 0.0]), 0.0
+    for _ in range(26):
+        rows = drivable(field, cells(), CORNER, CELL_M, pose, bend, line, 0.95)
+        assert len(rows) == STEPS
+        bend = rows[0, 0]
+        pose = driven(rows[:1], pose)[0]
+        cos, sin = math.cos(pose[2]), math.sin(pose[2])
+        for ahead, left in ((0.0, 0.8), (0.0, -0.8), (2.7, 0.8), (2.7, -0.8)):
+            x, y = pose[0] + ahead * cos - left * sin, pose[1] + ahead * sin + left * cos
+            assert not barrier[int(x / CELL_M), int(y / CELL_M)]
+        near = np.argmin(np.hypot(*(line[:, :2] - pose[:2]).T))
+        line = line[near:]
+    assert abs(pose[2] - side * 0.5 * math.pi) < 0.35
+
+
+def test_before_a_wall_the_way_ends():
+    barrier = np.zeros((160, 160), dtype=np.uint8)
+    barrier[50:, :] = 1
+    rows = drivable(field_of(barrier), cells(), CORNER, CELL_M, np.array([4.0, 8.0, 0.0]), 0.0, straight_line(), 0.95)
+    assert 0 < len(rows) < STEPS
+
+
+def test_the_ground_below_the_car_is_road_from_the_first_frame_on():
+    ground = Ground(CameraGeometry())
+    ground.see(np.full((120, 160, 3), 100, dtype=np.uint8), math.inf)
+    way = ground.way(0.0, -1.0, 1.35, False, 14.0, 0.95)
+    assert way.free_m == math.inf and way.seen_m > 3.0

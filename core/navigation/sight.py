@@ -44,6 +44,7 @@ AROUND = 80  # cells on each side of the vehicle in which the way is looked for:
 SPECK = np.ones((3, 3), dtype=np.uint8)  # fewer cells than that are no border, but the rim of a painted line
 BESIDE = np.ones((5, 5), dtype=np.uint8)  # an edge line lies within two cells of what is no road
 LONGEST_DASH_M = 3.7  # a dash has 3 m
+BEGINS_M, BORDER_M = 1.0, (1.5, 2.3)  # who has not driven farther has the border of a lane of 3.2 m that far aside
 STANDING_BENDS_1PM = tuple(0.08 * k for k in range(-4, 5))  # what a car that stands can turn its wheels to
 GAP_CELLS = 13.0  # a border goes on where it was hidden, over twice so many cells: round a corner the car looks past it
 STANDS_ON_M = (-1.5, 3.9, 1.3)  # what the car stands on at the start is road: from behind to ahead, and to either side
@@ -98,6 +99,7 @@ class Ground:
         self._cells: UInt8Array = np.zeros((CELLS, CELLS), dtype=np.uint8)
         self._origin_m = np.array([-0.5 * CELLS * CELL_M, -0.5 * CELLS * CELL_M])
         self._level = math.nan
+        self._has_border = False
         self.pose = np.zeros(3)  # of the rear axle
 
     def move(self, distance_m: float, turned_rad: float) -> None:
@@ -149,9 +151,18 @@ class Ground:
 
     def _stand(self) -> None:
         """Enter the ground below the car, which no frame has shown."""
-        back, ahead, aside = STANDS_ON_M
-        x, y = (grid.ravel() for grid in np.meshgrid(np.arange(back, ahead, 0.1), np.arange(-aside, aside, 0.1)))
-        _enter(self._cells, self._origin_m, self.pose, x, y, np.full(len(x), ROAD, dtype=np.uint8))
+        self._fill(-STANDS_ON_M[2], STANDS_ON_M[2], ROAD)
+
+    def _begin_border(self, side: float) -> None:
+        """Enter the border beside the car, which no frame has shown either: a search begins in the middle of a lane."""
+        self._has_border = True
+        if float(np.hypot(*self.pose[:2])) < BEGINS_M:
+            self._fill(*sorted((side * BORDER_M[0], side * BORDER_M[1])), OTHER)
+
+    def _fill(self, right_m: float, left_m: float, kind: int) -> None:
+        """Say of a rectangle beside the car what it is."""
+        x, y = (grid.ravel() for grid in np.meshgrid(np.arange(*STANDS_ON_M[:2], 0.1), np.arange(right_m, left_m, 0.1)))
+        _enter(self._cells, self._origin_m, self.pose, x, y, np.full(len(x), kind, dtype=np.uint8))
 
     def way(
         self,
@@ -168,6 +179,8 @@ class Ground:
         With ``straight_on`` it passes side streets on that side, and where the road ends it turns to the other side. ``need_m``
         is the room that the car must have on either side of its middle line. A car that ``stands`` may turn its wheels first.
         """
+        if not self._has_border:
+            self._begin_border(side)
         middle = ((self.pose[:2] - self._origin_m) / CELL_M).astype(np.int64)
         low = np.clip(middle - AROUND, 0, CELLS - 2 * AROUND)
         part = np.ascontiguousarray(self._cells[low[0] : low[0] + 2 * AROUND, low[1] : low[1] + 2 * AROUND])

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hippodrome.core.navigation.border import STEP_M
 from hippodrome.core.navigation.config import DriveConfig, VehicleShape
 from hippodrome.core.navigation.course import indicated
 from hippodrome.core.navigation.junctions import gate_speed_mps
-from hippodrome.core.navigation.sight import STEP_M, Ground
+from hippodrome.core.navigation.sight import Ground
 from hippodrome.core.navigation.speed import stopping_mps
 from hippodrome.core.navigation.steering import lane_curvature_1pm
 from hippodrome.core.navigation.types import Indicator, Radar

@@ -18,15 +18,25 @@ from numba import njit
 from numpy.typing import NDArray
 
 from hippodrome.core.navigation import sweep
-from hippodrome.core.navigation.sweep import distance_at, drivable
+from hippodrome.core.navigation.border import (
+    CELL_M,
+    OTHER,
+    PAINT,
+    REACH_M,
+    ROAD,
+    STEP_M,
+    UNKNOWN,
+    along_border,
+    borders,
+    seen_ground,
+)
+from hippodrome.core.navigation.sweep import drivable
 from hippodrome.core.types import FloatArray, Frame, UInt8Array
 from hippodrome.core.views.odometry import CameraGeometry
 
-CELL_M = 0.2
 CELLS = 400  # along each side: 80 m, in which the vehicle is kept 20 m away from the rim
 SHIFT_M = 20.0
 FAR_M = 12.0  # a pixel farther away spans more than a metre
-UNKNOWN, ROAD, OTHER, PAINT = 0, 1, 2, 3
 DARKEST, BRIGHTEST, PAINT_LEVEL = 0.45, 1.38, 1.7  # levels relative to the asphalt right ahead: shade, kerbstones, paint
 COLOURFUL = 0.16  # difference between a pixel's colours, relative to its level, from which on it is grass
 PATCH_M = (5.5, 0.9)  # the asphalt right ahead: so far ahead of the rear axle and to either side
@@ -35,27 +45,12 @@ STEADY = 0.85  # weight of the past in the level of the asphalt
 FITS_SHARE = 0.1  # of a path that may seem to be no road: its cells are as coarse as that
 SHIFT_STEP_M = 0.5
 
-STEP_M = 0.25  # of the way along the border
-REACH_M = 3.4  # how far aside the border is looked for
 NEAR_M = 0.5  # ahead of the rear axle, where the distance to the paint is measured
-AHEAD_M = 0.5  # ahead of the rear axle, where the line of equal distance from the border is followed
-SLOPE_M = 0.3  # over which the direction of the border is taken
 AROUND = 80  # cells on each side of the vehicle in which the way is looked for: 16 m
-SPECK = np.ones((3, 3), dtype=np.uint8)  # fewer cells than that are no border, but the rim of a painted line
-BESIDE = np.ones((5, 5), dtype=np.uint8)  # an edge line lies within two cells of what is no road
-LONGEST_DASH_M = 3.7  # a dash has 3 m
+BEGINS_M, BORDER_M = 1.0, (1.5, 2.3)  # who has not driven farther has the border of a lane of 3.2 m that far aside
 STANDING_BENDS_1PM = tuple(0.08 * k for k in range(-4, 5))  # what a car that stands can turn its wheels to
-GAP_CELLS = 13.0  # a border goes on where it was hidden, over twice so many cells: round a corner the car looks past it
 STANDS_ON_M = (-1.5, 3.9, 1.3)  # what the car stands on at the start is road: from behind to ahead, and to either side
 THICK_PX = 4  # beyond so many more pixels of no road, even that is not sure to be where it seems: hedges and walls stand up
-STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
-UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
-OTHER_SIDE_1PM = 0.12  # and more so where the other side of the road is nearest
-MOST_TURN_RAD = 1.9
-RECEDES_RAD, STRAIGHT_ON_M = 0.25, 0.2  # a border that leads away by so much is a side street's, for who goes straight on
-DECAY_M = 1.6  # distance over which an offset from the way fades
-TIGHTEST_1PM = 0.6  # of the line, which no car could drive round a sharp corner
-BEND_PER_STEP = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +93,7 @@ class Ground:
         self._cells: UInt8Array = np.zeros((CELLS, CELLS), dtype=np.uint8)
         self._origin_m = np.array([-0.5 * CELLS * CELL_M, -0.5 * CELLS * CELL_M])
         self._level = math.nan
+        self._has_border = False
         self.pose = np.zeros(3)  # of the rear axle
 
     def move(self, distance_m: float, turned_rad: float) -> None:
@@ -149,9 +145,19 @@ class Ground:
 
     def _stand(self) -> None:
         """Enter the ground below the car, which no frame has shown."""
-        back, ahead, aside = STANDS_ON_M
-        x, y = (grid.ravel() for grid in np.meshgrid(np.arange(back, ahead, 0.1), np.arange(-aside, aside, 0.1)))
-        _enter(self._cells, self._origin_m, self.pose, x, y, np.full(len(x), ROAD, dtype=np.uint8))
+        self._fill(-STANDS_ON_M[2], STANDS_ON_M[2], ROAD)
+
+    def _begin_border(self, side: float) -> None:
+        """Enter the border beside the car, which no frame has shown either: a search begins in the middle of a lane."""
+        self._has_border = True
+        if float(np.hypot(*self.pose[:2])) < BEGINS_M:
+            near_m, far_m = side * BORDER_M[0], side * BORDER_M[1]
+            self._fill(min(near_m, far_m), max(near_m, far_m), OTHER)
+
+    def _fill(self, right_m: float, left_m: float, kind: int) -> None:
+        """Say of a rectangle beside the car what it is."""
+        x, y = (grid.ravel() for grid in np.meshgrid(np.arange(*STANDS_ON_M[:2], 0.1), np.arange(right_m, left_m, 0.1)))
+        _enter(self._cells, self._origin_m, self.pose, x, y, np.full(len(x), kind, dtype=np.uint8))
 
     def way(
         self,
@@ -168,13 +174,15 @@ class Ground:
         With ``straight_on`` it passes side streets on that side, and where the road ends it turns to the other side. ``need_m``
         is the room that the car must have on either side of its middle line. A car that ``stands`` may turn its wheels first.
         """
+        if not self._has_border:
+            self._begin_border(side)
         middle = ((self.pose[:2] - self._origin_m) / CELL_M).astype(np.int64)
         low = np.clip(middle - AROUND, 0, CELLS - 2 * AROUND)
         part = np.ascontiguousarray(self._cells[low[0] : low[0] + 2 * AROUND, low[1] : low[1] + 2 * AROUND])
         seen = seen_ground(part)
         field = CELL_M * cv2.distanceTransform(1 - borders(part), cv2.DIST_L2, 5).astype(np.float64)
         corner_m = self._origin_m + CELL_M * low
-        line = _along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
+        line = along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
         bends = sorted(STANDING_BENDS_1PM, key=lambda one: abs(one - bend_1pm)) if stands else [bend_1pm]
         tried = [
             drivable(field, seen, corner_m, CELL_M, self.pose, one, np.ascontiguousarray(line[:, :3]), need_m) for one in bends
@@ -222,35 +230,6 @@ class Ground:
         kind = self._cells[i[inside], j[inside]]
         known = kind != UNKNOWN
         return float(np.mean(kind[known] == OTHER)) if known.any() else 0.0
-
-
-def borders(part: UInt8Array) -> UInt8Array:
-    """1 where cells (n, m) are what the car must not drive on: what is no road, and the painted lines at its edges.
-
-    A line is an edge's if it is thin and longer than any dash, or lies beside what is no road. Stop lines are thick.
-    """
-    other = cv2.morphologyEx((part == OTHER).astype(np.uint8), cv2.MORPH_OPEN, SPECK)
-    paint = (part == PAINT).astype(np.uint8)
-    thick = cv2.dilate(cv2.morphologyEx(paint, cv2.MORPH_OPEN, SPECK), SPECK)
-    thin = paint * (1 - thick)
-    edge = thin * cv2.dilate(other, BESIDE)
-    count, label, stats, _ = cv2.connectedComponentsWithStats(thin, connectivity=8)
-    if count > 1:
-        extent = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) * CELL_M
-        long = extent > LONGEST_DASH_M
-        long[0] = False
-        edge |= long[label].astype(np.uint8)
-    found: UInt8Array = cv2.morphologyEx(other | edge, cv2.MORPH_CLOSE, STRIPES).astype(np.uint8)
-    near = (cv2.distanceTransform(1 - found, cv2.DIST_L2, 5) <= GAP_CELLS).astype(np.uint8)
-    closed = (cv2.distanceTransform(near, cv2.DIST_L2, 5) > GAP_CELLS) & (seen_ground(part) == 0)
-    both: UInt8Array = found | closed.astype(np.uint8)
-    return both
-
-
-def seen_ground(part: UInt8Array) -> UInt8Array:
-    """1 where cells (n, m) have been seen, or lie between the rows of pixels of a frame."""
-    seen: UInt8Array = cv2.morphologyEx((part != UNKNOWN).astype(np.uint8), cv2.MORPH_CLOSE, STRIPES).astype(np.uint8)
-    return seen
 
 
 def _hidden(kind: UInt8Array) -> NDArray[np.bool_]:
@@ -304,48 +283,3 @@ def _border_m(cells: UInt8Array, origin: FloatArray, x: float, y: float, heading
         if kind == UNKNOWN:
             unknown += 1
     return REACH_M if unknown < 10 else np.nan
-
-
-@njit(cache=True)
-def _along_border(
-    field: FloatArray,
-    corner: FloatArray,
-    pose: FloatArray,
-    bend: float,
-    side: float,
-    beside_m: float,
-    straight_on: bool,
-    count: int,
-) -> FloatArray:
-    """The line of equal distance from the border: rows (count, 4) of place, heading, and whether the border was seen.
-
-    A law of steering (Samson) acts on it: round a sharp corner it is an arc, and where the road bends away the border comes
-    nearer ahead.
-    """
-    rows = np.zeros((count, 4))
-    x, y, heading = pose[0], pose[1], pose[2]
-    for k in range(count):
-        cos, sin = math.cos(heading), math.sin(heading)
-        px, py = x + AHEAD_M * cos, y + AHEAD_M * sin
-        d = distance_at(field, corner, CELL_M, px, py)
-        gx = distance_at(field, corner, CELL_M, px + SLOPE_M, py) - distance_at(field, corner, CELL_M, px - SLOPE_M, py)
-        gy = distance_at(field, corner, CELL_M, px, py + SLOPE_M) - distance_at(field, corner, CELL_M, px, py - SLOPE_M)
-        seen = d < REACH_M and gx * gx + gy * gy > 1e-6
-        wanted = 0.0 if straight_on else side * UNSEEN_1PM
-        if seen:
-            along = math.atan2(gy, gx) + side * 0.5 * math.pi  # the border's direction, with the border on the own side
-            turn = (heading - along + math.pi) % (2.0 * math.pi) - math.pi
-            off = side * (beside_m - min(d, beside_m + 1.0))  # of the vehicle to the left of its line
-            if straight_on and side * turn < -RECEDES_RAD and d > beside_m - STRAIGHT_ON_M:
-                wanted = 0.0  # the border leads into a side street
-            elif abs(turn) < MOST_TURN_RAD:
-                wanted = -off / DECAY_M**2 - 2.0 * turn / DECAY_M
-            else:  # what is nearest is the border of the other side
-                wanted = side * OTHER_SIDE_1PM
-        wanted = min(max(wanted, -TIGHTEST_1PM), TIGHTEST_1PM)
-        bend += min(max(wanted - bend, -BEND_PER_STEP), BEND_PER_STEP)
-        rows[k, 0], rows[k, 1], rows[k, 2] = x, y, heading
-        rows[k, 3] = 1.0 if seen else 0.0
-        x, y = x + STEP_M * cos, y + STEP_M * sin
-        heading += STEP_M * bend
-    return rows

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from hippodrome.core.navigation.sight import OTHER, PAINT, ROAD, UNKNOWN, Ground, borders
+from hippodrome.core.navigation.border import OTHER, PAINT, ROAD, UNKNOWN, borders
+from hippodrome.core.navigation.sight import Ground
 from hippodrome.core.navigation.sweep import STEP_M, STEPS, drivable
 from hippodrome.core.views.odometry import CameraGeometry
 

@@ -56,12 +56,15 @@ def line_levels(
     return brightest
 
 
-def driven_m(before: FloatArray, after: FloatArray, expected_m: float) -> float:
+def driven_m(before: FloatArray, after: FloatArray, expected_m: float, sigma: float = math.inf) -> float:
     """The distance between two frames of which the levels are ``before`` and ``after``; nan where they do not tell.
+
+    It is looked for about the expected one, of whose logarithm ``sigma`` is the standard deviation.
 
     Between shifts of ``STEP_M`` it is the peak of the parabola through the best one and its neighbours.
     """
-    low, high = (max(int(share * expected_m / STEP_M), 1) for share in SHARE_RANGE)
+    least, most = max(SHARE_RANGE[0], math.exp(-3.0 * sigma)), min(SHARE_RANGE[1], math.exp(min(3.0 * sigma, 3.0)))
+    low, high = (max(int(share * expected_m / STEP_M), 1) for share in (least, most))
     return float(_best_shift(before, after, low, min(high, len(before) - LEAST_OVERLAP)))
 
 

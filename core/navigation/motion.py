@@ -13,6 +13,10 @@ from hippodrome.core.navigation.config import VehicleShape
 from hippodrome.core.types import Observation
 
 PRIOR_SIGMA = 0.28  # of ln(scale): two drives differ by a fifth each
+GATE_SIGMAS, LEAST_SEEN_M = (
+    2.5,
+    0.5,
+)  # what dashes told is dropped if it is farther from all else; from so many metres on it counts
 VISUAL_SIGMA, VISUAL_M = 0.02, 15.0  # what passing dashes tell, once they have been seen over so many metres
 TOLD_SIGMA, TOLD_PER_M = (
     0.03,
@@ -42,18 +46,31 @@ class Motion:
     told_m: float = 0.0  # driven since it first did
 
     def metres_per_unit(self, expected: float) -> float:
-        """The scale: a mean of ln(scale) by what is expected, dashes and turns, each with its weight."""
+        """The scale: a mean of ln(scale) by what is expected, turns, the localizer, and dashes unless those contradict them."""
+        mean, sigma = self.scale_without_dashes(expected)
+        if not self.dashes_fit(expected):
+            return math.exp(mean)
+        trust = min(self.seen_m / VISUAL_M, 1.0) ** 2 / VISUAL_SIGMA**2
+        weight = 1.0 / sigma**2
+        return math.exp((weight * mean + trust * math.log(self.seen_m / self.seen_units)) / (weight + trust))
+
+    def dashes_fit(self, expected: float) -> bool:
+        """Whether dashes told something that the rest does not contradict: one dash is easily taken for the next."""
+        if self.seen_m <= LEAST_SEEN_M or self.seen_units <= 0.0:
+            return False
+        mean, sigma = self.scale_without_dashes(expected)
+        return abs(math.log(self.seen_m / self.seen_units) - mean) < GATE_SIGMAS * math.hypot(sigma, VISUAL_SIGMA)
+
+    def scale_without_dashes(self, expected: float) -> tuple[float, float]:
+        """Mean and standard deviation of ln(scale) by what is expected, by turns, and by the localizer."""
         total, weight = math.log(expected) / PRIOR_SIGMA**2, 1.0 / PRIOR_SIGMA**2
-        if self.seen_m > 0.5 and self.seen_units > 0.0:
-            trust = min(self.seen_m / VISUAL_M, 1.0) ** 2 / VISUAL_SIGMA**2
-            total, weight = total + trust * math.log(self.seen_m / self.seen_units), weight + trust
         if self.turned > 0.0 and self.turning > 0.0:
             trust = min(self.turned_rad / STEERED_RAD, 1.0) ** 2 / STEERED_SIGMA**2
             total, weight = total + trust * math.log(self.turned / self.turning), weight + trust
         if not math.isnan(self.told):
             trust = 1.0 / (TOLD_SIGMA**2 + PRIOR_SIGMA**2 * math.exp(-self.told_m / SETTLED_M))
             total, weight = total + trust * self.told, weight + trust
-        return math.exp(total / weight)
+        return total / weight, weight**-0.5
 
 
 def sensed(motion: Motion, observation: Observation, metres_per_unit: float, vehicle: VehicleShape) -> Motion:
@@ -73,6 +90,11 @@ def sensed(motion: Motion, observation: Observation, metres_per_unit: float, veh
 def seen(motion: Motion, metres: float, units: float) -> Motion:
     """The motion after frames told that so many units of the odometry were so many metres."""
     return replace(motion, seen_m=SEEN_MEMORY * motion.seen_m + metres, seen_units=SEEN_MEMORY * motion.seen_units + units)
+
+
+def unseen(motion: Motion) -> Motion:
+    """The motion without what frames told."""
+    return replace(motion, seen_m=0.0, seen_units=0.0)
 
 
 def commanded(motion: Motion, acceleration_mps2: float, steering_rad: float, dt_s: float) -> Motion:

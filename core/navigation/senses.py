@@ -80,12 +80,17 @@ class Senses:
         levels = line_levels(
             observation.frame, self._config.camera, memory.offset_m, memory.heading_rad, memory.curvature_1pm, -self._side
         )
-        scale = self.motion.metres_per_unit(self._expected_scale)
+        if not self.motion.dashes_fit(self._expected_scale) and self.motion.seen_m > motions.LEAST_SEEN_M:
+            self.motion = motions.unseen(self.motion)
+        scale, (_, sigma) = (
+            self.motion.metres_per_unit(self._expected_scale),
+            self.motion.scale_without_dashes(self._expected_scale),
+        )
         line = self._line
         if line is not None and scale * line.units < LEAST_M:
             return
         if line is not None and scale * line.units < MOST_M:
-            metres = driven_m(line.levels, levels, scale * line.units)
+            metres = driven_m(line.levels, levels, scale * line.units, sigma)
             if math.isfinite(metres):
                 self.motion = motions.seen(self.motion, metres, line.units)
         self._line = LineView(levels, 0.0)

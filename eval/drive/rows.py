@@ -52,7 +52,8 @@ def row_named(key: str) -> RowSpec:
 def navigator_config(scenario: Scenario, row: RowSpec) -> NavigatorConfig:
     """The navigator's configuration: the scenario's camera and localizer, and what the row leaves out."""
     camera = scenario.camera
-    localizer = scenario.localizer if row.mode is None else replace(scenario.localizer, mode=row.mode)
+    localizer = replace(scenario.localizer, road_reading=False)  # the navigator reads the road itself
+    localizer = localizer if row.mode is None else replace(localizer, mode=row.mode)
     geometry = CameraGeometry(fov_deg=camera.fov_deg, height_m=camera.height_m, forward_m=camera.forward_m)
     return NavigatorConfig(localizer=localizer, camera=geometry, read_road=row.read_road, exact_poses=row.pose == "truth")
 

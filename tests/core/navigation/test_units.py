@@ -148,3 +148,13 @@ def test_sensors_that_fail_are_named():
     assert failing(lambda k: Observation(0.1 * (k + 1), 0.1, 5.0, 1e-3, frame)) == (True, "the gyro is frozen")
     assert failing(fine, wheels=0.3) == (True, "the gyro does not tell how the vehicle turns")
     assert failing(fine, Radar(blind=True)) == (True, "the radar is blind")
+
+
+def test_dashes_that_turns_contradict_are_dropped():
+    """A dash that is taken for the next one tells a wrong scale with great certainty."""
+    turned = motions.Motion(turned=2.0, turning=1.0, turned_rad=1.0)
+    right, wrong = motions.seen(turned, 20.4, 10.0), motions.seen(turned, 15.0, 10.0)
+    assert right.dashes_fit(1.6) and right.metres_per_unit(1.6) == pytest.approx(2.04, rel=0.01)
+    assert not wrong.dashes_fit(1.6) and wrong.metres_per_unit(1.6) == pytest.approx(2.0, rel=0.03)
+    assert motions.seen(motions.Motion(), 15.0, 10.0).dashes_fit(1.6)  # nothing contradicts them yet
+    assert not motions.unseen(wrong).dashes_fit(1.6)

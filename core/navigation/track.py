@@ -20,7 +20,10 @@ ALONG_PER_M = 0.005  # variance along the way that each metre adds
 SCALE_SIGMA = 0.015  # and the share of the way that it is wrong by: passing dashes tell the scale so well
 HEADING_RAD_PER_SQRT_M = 0.003  # random walk of the heading
 SIDE_RAD = 0.005  # drift across per metre
-LOCALIZED_M, LOCALIZED_RAD = (3.0, 3.0), 0.15  # of the localizer's pose, each time: its errors repeat for tens of metres
+LOCALIZED_M, LOCALIZED_RAD = (
+    (1.5, 3.0),
+    0.15,
+)  # of the localizer's pose, each time: its errors repeat, across for longer than along
 LANE_FLOOR_M, LANE_FLOOR_RAD = 0.08, 0.02  # a lane read from a frame is not better than that
 END_FLOOR_M = {LaneEnd.STOP_LINE: 0.4, LaneEnd.MOUTH: 0.4}  # nor where a stop line or a mouth lies
 STOP_LINE_BEFORE_END_M = 0.9  # the near edge of a stop line, before the end of the lane

@@ -23,7 +23,7 @@ SIDE_RAD = 0.005  # drift across per metre
 LOCALIZED_M, LOCALIZED_RAD = (
     (1.5, 3.0),
     0.15,
-)  # of the localizer's pose, each time: its errors repeat, across for longer than along
+)  # of the localizer's pose, each time: its errors repeat, across longer than along
 LANE_FLOOR_M, LANE_FLOOR_RAD = 0.08, 0.02  # a lane read from a frame is not better than that
 END_FLOOR_M = {LaneEnd.STOP_LINE: 0.4, LaneEnd.MOUTH: 0.4}  # nor where a stop line or a mouth lies
 STOP_LINE_BEFORE_END_M = 0.9  # the near edge of a stop line, before the end of the lane

@@ -41,6 +41,8 @@ def _invalid(root: yaml.Node | None, error: ValidationError) -> Iterator[tuple[i
         line, place, node = _find(root, one["loc"])
         if one["type"] == "missing":
             place = f"{place}.{one['loc'][-1]}".removeprefix(".")
+        elif isinstance(node, yaml.MappingNode) and isinstance(one.get("input"), int | float) and isinstance(one["loc"][-1], str):
+            place = f"{place}: {one['loc'][-1]}"  # a key that stands in the file below an earlier name
         if isinstance(node, yaml.MappingNode) and one["type"] == "literal_error":
             continue  # a mapping was never meant to be one of the names: its own errors follow
         if one["type"] in MODEL_TYPES and place == "noise":

@@ -80,7 +80,11 @@ TAKEN = [
     ("reli/one-bit-flipped.original.mcap", "import {0} --out {1}", "165 frames"),
     ("reli/markup-A.json", "compare {0} {0}", r"x\[/b\]|stand still|nothing moved"),
     ("reli/escape-A.json", "compare {0} {0}", ""),
-    ("reli/map-zip-longer.pbstream", "refine {0} --network {net} --out {1}", "nothing vouches .* refused all of its 129 vertices"),
+    (
+        "reli/map-zip-longer.pbstream",
+        "refine {0} --network {net} --out {1}",
+        "nothing vouches .* refused all of its 129 vertices",
+    ),
     ("traj/ns.csv", "import {tum} --odometry {0} --out {1}", "taken for nanoseconds"),
     ("traj/leadcomment.tum", "import {tum} --truth {0} --out {1}", "truth for 100%"),
     ("traj/bom.tum", "score {0} {rec}", "mean 0.000 m.* 120 of 120"),

@@ -25,6 +25,10 @@ PAGE: Final = "drive.html"
 COLOURS: Final = ("#1769aa", "#b3432b", "#2e7d4f", "#7a4fa3", "#a8741a", "#0f7c80")  # of missions, in turn
 EVERY: Final = 5  # a point of the trace in half a second
 MARGIN_M: Final = 15.0
+LEGEND: Final = (
+    "Ways of the first row, a colour for each mission: from the small dot to the large one, dashed until the vehicle knew where it was. "
+    "Point at a way to read its number."
+)
 STYLE: Final = """
 .town { width: 100%; height: auto; max-height: 75vh; display: block; border: 1px solid var(--line); border-radius: 10px; }
 .town .road { fill: none; stroke: var(--road); stroke-width: 3; stroke-linecap: round; }
@@ -72,7 +76,7 @@ def _town(result: ScenarioResult, tasks: Sequence[MissionTask]) -> Html:
         element("tbody", *rows),
         class_="words",
     )
-    return element("section", element("h2", result.name), _map(network, ways), table)
+    return element("section", element("h2", result.name), element("p", LEGEND), _map(network, ways), table)
 
 
 def _mission(method: str, one: dict[str, Any]) -> Html:

@@ -26,8 +26,8 @@ COLOURS: Final = ("#1769aa", "#b3432b", "#2e7d4f", "#7a4fa3", "#a8741a", "#0f7c8
 EVERY: Final = 5  # a point of the trace in half a second
 MARGIN_M: Final = 15.0
 LEGEND: Final = (
-    "Ways of the first row, a colour for each mission: from the small dot to the large one, dashed until the vehicle knew where it was. "
-    "Point at a way to read its number."
+    "Ways of the first row, a colour for each mission: from the small dot to the large one, dashed until the vehicle "
+    "knew where it was. Point at a way to read its number."
 )
 STYLE: Final = """
 .town { width: 100%; height: auto; max-height: 75vh; display: block; border: 1px solid var(--line); border-radius: 10px; }

@@ -33,7 +33,8 @@ from scipy.optimize import minimize
 from scipy.spatial import KDTree
 
 from hippodrome.core.mapping.motion_mapper import MotionMapper
-from hippodrome.core.matching.confidence import ConfidenceConfig, explained_samples, match_status
+from hippodrome.core.matching.confidence import explained_samples, match_status
+from hippodrome.core.matching.config import ConfidenceConfig
 from hippodrome.core.matching.control import control_of
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.problem import search_problem
@@ -47,8 +48,8 @@ from hippodrome.proto.codec import load_map
 from hippodrome.sim.network import read_network
 from hippodrome.sim.record import RecordingPlan, simulate
 from hippodrome.sim.scenario import DriveSpec, Scenario
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town_spec import TownSpec
 
 TOWNS = Path(__file__).parent.parent / "scenarios/towns"
 KINDS = ("grid", "radial", "random", "rural")

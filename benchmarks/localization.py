@@ -14,11 +14,12 @@ import numpy as np
 
 from benchmarks.table import Row
 from hippodrome.core.attractors import grid_cells, head_direction
-from hippodrome.core.attractors.attractor import AttractorConfig
+from hippodrome.core.attractors.config import GRID_INFORMATION, AttractorConfig
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
 from hippodrome.core.types import AttractorStates, CognitiveMap, Edges, Frame, Observation, ViewCells, Visits
-from hippodrome.core.views.descriptors import ViewCellConfig, describe
-from hippodrome.core.views.index import SearchConfig, index_of, search
+from hippodrome.core.views.config import SearchConfig, ViewCellConfig
+from hippodrome.core.views.descriptors import describe
+from hippodrome.core.views.index import index_of, search
 from hippodrome.core.views.scoring import bank_of, start_query_mean, template_mean
 
 BANKS = (1_400, 10_000, 100_000)
@@ -38,7 +39,7 @@ def run() -> list[Row]:
 
 
 def _attractor_tick() -> Row:
-    head_config, grid_config = AttractorConfig(), AttractorConfig(information=grid_cells.GRID_INFORMATION)
+    head_config, grid_config = AttractorConfig(), AttractorConfig(information=GRID_INFORMATION)
     head = head_direction.known(0.3, head_config)
     grid = grid_cells.known(np.zeros(2), grid_cells.module_periods(97.0), grid_config)
     noise = np.full((2, 2), 1e-4)

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import Row
+from hippodrome.core.mapping.config import MapperConfig
 from hippodrome.core.mapping.experience_map import Closure, closure_edges, concatenated, odometry_edges, relaxed_poses
-from hippodrome.core.mapping.mapper import Mapper, MapperConfig
+from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.types import CognitiveMap, Frame, Observation
 from hippodrome.core.views import keyframes
 from hippodrome.core.views.descriptors import describe

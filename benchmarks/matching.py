@@ -27,7 +27,8 @@ from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.route import Route, search_route
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
-from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
 from tests.core.synthetic import SyntheticDrive, semi_metric_drive
 
 TOWN = TownSpec(kind="random", width_m=900.0, height_m=900.0, road_km=20.0, lanes=2)

@@ -20,7 +20,7 @@ from hippodrome.core.reading import LaneEnd, RoadReader, RoadReading
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.config import CameraGeometry
 from hippodrome.sim.record import RecordingPlan, close_renderer, record
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import Scenario

@@ -22,10 +22,11 @@ from hippodrome.sim.render.flat import VERTEX_DTYPE, VERTEX_SHADER, fragment_sha
 from hippodrome.sim.render.gl import pyrender
 from hippodrome.sim.render.renderer import FINE_DETAIL_M, FrameRenderer
 from hippodrome.sim.scene.build import build_scene
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.scene.light import DOME_RADIUS_M
 from hippodrome.sim.scene.types import Scene, Tile
-from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.types import Town
 
 SIZES = ((160, 120), (320, 240), (640, 480))

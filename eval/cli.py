@@ -56,9 +56,6 @@ def _run(options: argparse.Namespace) -> int:
 
     sweep_temporary()
     make_numba_cache()  # before anything is imported that compiles
-    from hippodrome.eval.pool import one_opencv_thread  # not before the arguments are read: --help answers at once
-
-    one_opencv_thread()
     command: Command = options.command
     return command(options)
 

@@ -17,8 +17,10 @@ from hippodrome.sim.net_heights import heights_along_m, pitch_rad
 from hippodrome.sim.path import Piece, piece_starts, sample_count, smooth_path
 from hippodrome.sim.pilot import DriveLog, Pilot
 from hippodrome.sim.sumo_run import SUMO_STEP_S, BackgroundTraffic, sumo_run
-from hippodrome.sim.tour import TourGraph, TourSpec, coverage_and_revisits, tour_graph, toured_area
-from hippodrome.sim.traffic import TrafficSpec, vehicle_types_xml
+from hippodrome.sim.tour import TourGraph, coverage_and_revisits, tour_graph, toured_area
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.traffic import vehicle_types_xml
+from hippodrome.sim.traffic_spec import TrafficSpec
 from hippodrome.sim.types import Drive, Town
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import FloatArray, Frame, GroundTruth, IntArray, Observation, Step
 from hippodrome.sim.drive import drive_pitch_rad
-from hippodrome.sim.scene.conditions import Conditions, apply_camera
+from hippodrome.sim.scene.conditions import apply_camera
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.self_motion import SelfMotion
 from hippodrome.sim.traffic import traffic_at
 from hippodrome.sim.types import Drive

@@ -11,11 +11,13 @@ import numpy as np
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 from hippodrome.sim.blockage import clear_around, ego_is_waiting, red_signal, send_ego_again, what_holds_ego
-from hippodrome.sim.ego_spec import REAR_AXLE_TO_FRONT_M, EgoSpec, comfortable_speed_mps
+from hippodrome.sim.ego_spec import REAR_AXLE_TO_FRONT_M, EgoSpec
+from hippodrome.sim.ego_speed import comfortable_speed_mps
 from hippodrome.sim.lane_log import LaneLog, driven_edges, lane_pieces, lanes_ahead, ways_out, ways_to_edge
 from hippodrome.sim.path import STEP_M, Piece, piece_of_samples, piece_starts, smooth_path
 from hippodrome.sim.sumo_run import EGO, SUMO_STEP_S, BackgroundTraffic, add_vehicle, drawn_length_factors
-from hippodrome.sim.tour import TourGraph, TourSpec, plan_tour
+from hippodrome.sim.tour import TourGraph, plan_tour
+from hippodrome.sim.tour_spec import TourSpec
 from hippodrome.sim.types import TrafficLog
 
 WARM_UP_S: Final = 20.0  # traffic spreads before the ego enters

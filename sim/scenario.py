@@ -8,18 +8,18 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from hippodrome.core.localization.config import LocalizerConfig
-from hippodrome.core.mapping.mapper import MapperConfig
-from hippodrome.core.refinement.refine import RefineConfig
+from hippodrome.core.mapping.config import MapperConfig
+from hippodrome.core.refinement.config import RefineConfig
 from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.renamed import with_present_names
 from hippodrome.sim.render.camera import CameraSpec, camera_divider
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.self_motion import NoiseLevel, SelfMotionNoise, noise_of
 from hippodrome.sim.spec import Spec
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town_spec import TownSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 from hippodrome.sim.yaml_file import load_yaml
 
 METHOD_NAME = r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$"  # of a method: it stands in tables, and files are named after it

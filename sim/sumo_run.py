@@ -17,7 +17,8 @@ from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 from hippodrome.sim.network import HELD_PHASE_S
 from hippodrome.sim.sumo_tools import without_comma, without_connectors
 from hippodrome.sim.tour import TourGraph
-from hippodrome.sim.traffic import KIND_SHARES, VEHICLE_SIZES_M, TrafficSpec, random_trip
+from hippodrome.sim.traffic import KIND_SHARES, VEHICLE_SIZES_M, random_trip
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 SUMO_STEP_S: Final = 0.1
 EGO: Final = "ego"

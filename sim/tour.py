@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from pydantic import Field
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -15,30 +14,13 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 from hippodrome.sim.network import drivable_edges, edge_lengths_m, edge_links, junction_lengths_m
-from hippodrome.sim.spec import Spec
 
-DEFAULT_LENGTH_M: Final = 3800.0  # once over a default town, in 12 minutes
-TYPICAL_SPEED_MPS: Final = 5.5  # of the paper's drive: about 7.2 km in 1,315 s
 U_TURN_RAD: Final = np.deg2rad(150.0)  # a sharper change of direction is a U-turn
 U_TURN_COST_M: Final = 300.0  # a detour this long is preferred to a U-turn
 JUNCTION_M: Final = 10.0  # cost of one crossing; it also keeps very short edges from being free
 START_ROOM_M: Final = 20.0  # a drive starts on an edge with room for the car and its first metres
 OUTSIDE_COST: Final = 5.0  # leaving the toured area must save four fifths of the way
 TASTE: Final = 0.3  # standard deviation of the log-normal liking of each edge, which makes tours of different seeds differ
-
-
-class TourSpec(Spec):
-    """How long to drive, by distance or by time (the first to be reached), and how much of it on roads driven before."""
-
-    length_m: float | None = Field(None, gt=0.0, le=1e6)
-    duration_s: float | None = Field(None, gt=0.0, le=1e5)
-    revisit_share: float = Field(0.4, ge=0.0, le=0.95)  # wanted; on a town larger than the tour it bounds the toured area
-
-    def planned_length_m(self) -> float:
-        """The tour's length, estimated where only a duration is given."""
-        if self.length_m is not None:
-            return self.length_m
-        return DEFAULT_LENGTH_M if self.duration_s is None else TYPICAL_SPEED_MPS * self.duration_s
 
 
 @dataclass(frozen=True, slots=True, eq=False)

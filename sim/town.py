@@ -11,11 +11,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 import shapely
-from pydantic import Field
 
 from hippodrome._files import replacing
 from hippodrome._folders import temporary_folder
@@ -28,8 +27,8 @@ from hippodrome.sim.net_heights import crossings_without_height, lane_heights_m
 from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
-from hippodrome.sim.spec import Spec
 from hippodrome.sim.sumo_tools import check_that_sumo_reads, run_tool
+from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.types import Town
 
 LANE_WIDTH_M: Final = 3.2  # SUMO's default
@@ -51,19 +50,6 @@ CONVERT_OPTIONS: Final = (
     "--offset.disable-normalization=true",
     "--no-warnings=true",
 )
-
-
-class TownSpec(Spec):
-    """Which town to build. The defaults are CARLA Town07 as SUMO sees it: 4.39 km of directed roads in 287 m by 370 m."""
-
-    kind: Literal["rural", "grid", "radial", "random"] = "rural"
-    width_m: float = Field(287.0, ge=100.0, le=20_000.0)
-    height_m: float = Field(370.0, ge=100.0, le=20_000.0)
-    road_km: float = Field(4.39, ge=0.8, le=500.0)  # directed: a two-way street counts twice
-    lanes: int = Field(1, ge=1, le=2)  # per direction
-    speed_limit_mps: float = Field(8.33, ge=3.0, le=40.0)
-    driving_side: Choice = "auto"  # auto: as the network or map says, and right where none does
-    network: Path | None = None  # a .net.xml, .net.xml.gz, .osm or .xodr (also .gz); overrides kind, sizes, lanes and limit
 
 
 def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from pydantic import Field
 
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray, IntArray, UInt8Array
-from hippodrome.sim.spec import Spec
 from hippodrome.sim.tour import U_TURN_COST_M, TourGraph
 from hippodrome.sim.types import TrafficLog
 
@@ -18,12 +16,6 @@ VEHICLE_SIZES_M: Final[FloatArray] = np.array([[4.3, 1.8, 1.5], [5.9, 2.0, 2.6],
 KIND_SHARES: Final = (0.7, 0.2, 0.1)
 KIND_ACCEL_MPS2: Final = (2.4, 1.8, 1.2)
 TRIP_EDGES: Final = 40  # some kilometres, so that most vehicles are seen more than once
-
-
-class TrafficSpec(Spec):
-    """Background traffic."""
-
-    vehicles: int = Field(20, ge=0, le=1000)  # on the road at the same time, as far as they find room
 
 
 def traffic_at(log: TrafficLog, t_s: float) -> tuple[FloatArray, UInt8Array, IntArray]:

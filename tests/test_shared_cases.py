@@ -16,9 +16,10 @@ from hippodrome.eval.cli import main
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.recording import open_recording
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec, build_town
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 from tests.subjects import net
 
 CASES = Path(__file__).parents[1].parent / "shared" / "cases"

@@ -6,7 +6,7 @@ means and two reliabilities (1/sigma^2).
 
 - ``attractor``: the equations, one function each. Begin here.
 - ``head_direction``: one network on a ring, for the heading.
-- ``grid_cells``: networks on tori of several periods, for the position.
+- ``grid_cells``: networks on tori of several periods, for the position; ``grid_decoding`` tells it from their phases.
 
 The mapper (``mapping.networks``) and two of the localizer's beliefs (``localization.beliefs``) are built from them.
 """

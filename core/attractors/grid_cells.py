@@ -5,7 +5,7 @@ drift exceeds half a period. Modules of unequal periods together tell the positi
 single torus).
 
 Lengths are in the caller's unit: map units while mapping, metres while localizing. An immutable state, and pure functions on it,
-as in ``head_direction``.
+as in ``head_direction``; ``grid_decoding`` tells a position from the phases.
 """
 
 from __future__ import annotations
@@ -17,13 +17,11 @@ import numpy as np
 from numba import njit
 
 from hippodrome.core.attractors import attractor
-from hippodrome.core.attractors.attractor import CALIBRATION, INTEGRATOR, AttractorConfig
+from hippodrome.core.attractors.attractor import CALIBRATION, INTEGRATOR
+from hippodrome.core.attractors.config import PERIOD_RATIOS, TURN, AttractorConfig
+from hippodrome.core.attractors.grid_decoding import decode, decode_compiled
 from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
-
-PERIOD_RATIOS = (97.0, 131.0, 173.0)  # pairwise coprime: the joint code repeats only after 97 * 131 * 173 units
-TURN = 2.0 * math.pi
-GRID_INFORMATION = (PERIOD_RATIOS[0] / TURN) ** 2  # E of the first module, 1/rad^2: a sigma of 1 m at a period of 97 m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -221,75 +219,6 @@ def population_belief(state: GridState, population: int, near: FloatArray, reach
     return position, np.mean(reliability * per_length, axis=0)
 
 
-def decode(mean_rad: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float) -> FloatArray:
-    """The position (2,) that the phases of all modules encode.
-
-    Each phase tells the position only up to whole periods. Of the positions that are possible within about ``reach`` of ``near``
-    (2,), the one whose phases fit those of the modules best is returned. A ``reach`` of 0 takes the possible position nearest to
-    ``near``, as after each step of path integration.
-
-    Args:
-        mean_rad: phases (M modules, 2 axes).
-        reliability: reliabilities of the phases, the same shape, 1/rad^2.
-        period: periods of the modules, (M,).
-        near: a prior position, (2,).
-        reach: how far from ``near`` to search, in the unit of the periods.
-    """
-    position: FloatArray = _decode(mean_rad, reliability, period, near, reach)
-    return position
-
-
-@njit(cache=True)
-def _decode(mean: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float) -> FloatArray:
-    """The compiled part of ``decode``: the two axes are independent of each other, and each is decoded by itself."""
-    position = np.empty(2)
-    for a in range(2):
-        position[a] = _decode_axis(mean, reliability, period, a, near[a], reach)
-    return position
-
-
-@njit(cache=True)
-def _decode_axis(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: int, near: float, reach: float) -> float:
-    """Coordinate on axis ``a`` that fits the phases of all modules best.
-
-    On each sheet of the first module the modules' weighted mean is a candidate; the one of the least misfit wins, and of equal
-    misfits the one nearest to ``near``.
-    """
-    sheets = math.ceil(reach / period[0])
-    home = near + wrap_compiled(mean[0, a] - 2.0 * math.pi * near / period[0]) * period[0] / (2.0 * math.pi)
-    best, least = near, math.inf
-    for k in range(-sheets, sheets + 1):
-        candidate = _weighted_mean(mean, reliability, period, a, home + k * period[0])
-        misfit = _misfit(mean, reliability, period, a, candidate)
-        if misfit < least or (misfit == least and abs(candidate - near) < abs(best - near)):
-            best, least = candidate, misfit
-    return best
-
-
-@njit(cache=True)
-def _weighted_mean(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: int, about: float) -> float:
-    """Mean over the modules of the coordinate on axis ``a``, weighted by information: the least-squares solution.
-
-    A phase stands for many coordinates, one period apart; each module contributes the one nearest to ``about``.
-    """
-    shift, weight = 0.0, 0.0
-    for m in range(mean.shape[0]):
-        per_length = 2.0 * math.pi / period[m]
-        information = reliability[m, a] * per_length**2
-        shift += information * wrap_compiled(mean[m, a] - about * per_length) / per_length
-        weight += information
-    return about + shift / weight
-
-
-@njit(cache=True)
-def _misfit(mean: FloatArray, reliability: FloatArray, period: FloatArray, a: int, coordinate: float) -> float:
-    """How badly a coordinate on axis ``a`` fits the phases (M, 2): the sum of their squared errors over their variances."""
-    total = 0.0
-    for m in range(mean.shape[0]):
-        total += reliability[m, a] * wrap_compiled(mean[m, a] - 2.0 * math.pi * coordinate / period[m]) ** 2
-    return total
-
-
 @njit(cache=True)
 def _read_out(
     mean_rad: FloatArray, reliability: FloatArray, period: FloatArray, near: FloatArray, reach: float
@@ -310,4 +239,4 @@ def _read_out(
                 reliability[m, CALIBRATION, a],
             )
             per_axis[a] += total[m, a] * (2.0 * math.pi / period[m]) ** 2 / modules
-    return _decode(mean_f, total, period, near, reach), per_axis
+    return decode_compiled(mean_f, total, period, near, reach), per_axis

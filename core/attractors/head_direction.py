@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hippodrome.core.attractors import attractor
-from hippodrome.core.attractors.attractor import CALIBRATION, INTEGRATOR, AttractorConfig
+from hippodrome.core.attractors.attractor import CALIBRATION, INTEGRATOR
+from hippodrome.core.attractors.config import AttractorConfig
 from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 

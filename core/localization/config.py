@@ -6,11 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 from hippodrome.core.localization.beliefs.config import BeliefConfig
-from hippodrome.core.views.descriptors import ViewCellConfig
-from hippodrome.core.views.index import SearchConfig
-from hippodrome.core.views.keyframes import KeyframeConfig
-from hippodrome.core.views.odometry import CameraGeometry
-from hippodrome.core.views.sequence import SequenceConfig
+from hippodrome.core.views.config import CameraGeometry, KeyframeConfig, SearchConfig, SequenceConfig, ViewCellConfig
 
 
 @dataclass(frozen=True)

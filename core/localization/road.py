@@ -17,7 +17,7 @@ from hippodrome.core.reading import LaneEnd, RoadReader, RoadReading
 from hippodrome.core.roads.geometry import RoadGeometry, poses_on_segments, project
 from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray, Frame, IntArray
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.config import CameraGeometry
 
 REACH_M = 9.0  # two lanes aside and what lies beside the second: lanes farther from the believed position tell nothing
 SAME_WAY_RAD = math.radians(30.0)  # lanes whose direction differs less from the believed heading lead the same way

@@ -7,45 +7,15 @@ motion of a keyframe would be lost with its vertex.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
 
 from hippodrome.core import se2
-from hippodrome.core.mapping.pose_graph import PoseGraphConfig, relax_pose_graph
+from hippodrome.core.mapping.config import ExperienceMapConfig
+from hippodrome.core.mapping.pose_graph import relax_pose_graph
 from hippodrome.core.types import EdgeKind, Edges, FloatArray, IntArray
-
-
-@dataclass(frozen=True)
-class ExperienceMapConfig:
-    """Standard deviations of the edges, and how the poses relax.
-
-    Lengths are relative to the way driven or to the spacing of keyframes, so that no unit of length enters.
-    """
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
-
-    relaxation: Literal["robust", "ratslam"] = "robust"
-    pose_graph: PoseGraphConfig = field(default_factory=PoseGraphConfig)
-    odometry_along: float = 0.1  # sigma of a driven step's length, as a share of it: covers the slow drift of the scale
-    odometry_across: float = 0.02  # sigma of a driven step sideways, as a share of its length
-    odometry_turn_rad: float = 0.02  # sigma of the turn of a driven step: some tens of degrees over a thousand steps
-    closure_along: float = 0.2  # sigma of a closure along the road, in distances between two keyframes: 1 m at 5 m
-    closure_across: float = 0.1  # sigma of a closure across the road, in distances between two keyframes
-    closure_turn_rad: float = 0.06
-    steady_reach: float = 3.0  # distances between keyframes over which closures share a median offset, before and after
-    ratslam_correction: float = 0.5  # share of each edge's error that RatSLAM's relaxation corrects in one sweep
-    ratslam_sweeps: int = 100  # sweeps of RatSLAM's relaxation; RatSLAM itself does a few a frame, thousands in a drive
-
-    def __post_init__(self) -> None:
-        odometry = (self.odometry_along, self.odometry_across, self.odometry_turn_rad)
-        closure = (self.closure_along, self.closure_across, self.closure_turn_rad)
-        if min(*odometry, *closure) <= 0.0:
-            raise ValueError("experience map: standard deviations must be positive")
-        if not 0.0 < self.ratslam_correction <= 1.0 or self.ratslam_sweeps < 1:
-            raise ValueError("experience map: ratslam_correction must lie in (0, 1] and ratslam_sweeps be at least 1")
 
 
 @dataclass(frozen=True, slots=True)

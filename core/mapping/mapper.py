@@ -8,40 +8,25 @@ closure, and injects the place's pose into the attractor networks.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
 
 import numpy as np
 
 from hippodrome.core import se2
 from hippodrome.core.mapping import networks
+from hippodrome.core.mapping.config import MapperConfig
 from hippodrome.core.mapping.experience_map import (
     Closure,
-    ExperienceMapConfig,
     closure_edges,
     concatenated,
     odometry_edges,
     relaxed_poses,
     with_median_offsets,
 )
-from hippodrome.core.mapping.memory import PlaceMemory, PlaceMemoryConfig, Recognition
-from hippodrome.core.mapping.networks import MapperAttractorConfig, NeuralPose
+from hippodrome.core.mapping.memory import PlaceMemory, Recognition
+from hippodrome.core.mapping.networks import NeuralPose
 from hippodrome.core.types import CognitiveMap, FloatArray, Frame, HippodromeError, Observation, Visits
 from hippodrome.core.views import keyframes
 from hippodrome.core.views.descriptors import describe
-from hippodrome.core.views.keyframes import KeyframeConfig
-
-
-@dataclass(frozen=True)
-class MapperConfig:
-    """Every constant of the mapper, each declared beside its algorithm."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
-
-    view_step: KeyframeConfig = field(default_factory=KeyframeConfig)
-    memory: PlaceMemoryConfig = field(default_factory=PlaceMemoryConfig)
-    experience_map: ExperienceMapConfig = field(default_factory=ExperienceMapConfig)
-    attractor: MapperAttractorConfig = field(default_factory=MapperAttractorConfig)
 
 
 class MappingError(HippodromeError):

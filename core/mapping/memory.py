@@ -12,47 +12,18 @@ loop closure anyway, nothing is lost by the delay.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from dataclasses import dataclass
 
 import numpy as np
 
+from hippodrome.core.mapping.config import PlaceMemoryConfig
 from hippodrome.core.mapping.view_store import ViewStore
 from hippodrome.core.types import Float32Array, ViewCells
-from hippodrome.core.views.descriptors import Descriptor, ViewCellConfig
+from hippodrome.core.views.descriptors import Descriptor
 from hippodrome.core.views.graph import CellGraph
 from hippodrome.core.views.peaks import peak_of_values, peak_shift
 from hippodrome.core.views.scoring import score, start_query_mean, update_query_mean
-from hippodrome.core.views.sequence import (
-    NO_EVIDENCE,
-    Evidence,
-    Peak,
-    SequenceConfig,
-    filter_step,
-    peak,
-    standardise,
-)
-
-
-@dataclass(frozen=True)
-class PlaceMemoryConfig:
-    """When a view counts as one of a place seen before."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
-
-    view_cells: ViewCellConfig = field(default_factory=ViewCellConfig)
-    sequence: SequenceConfig = field(default_factory=SequenceConfig)
-    start_margin: float = 4.0  # least filtered margin on meeting an old road; strict, as a wrong closure breeds more of them
-    closure_margin: float = 2.0  # least filtered margin once on an old road
-    waiting_views: int = 16  # views that are pending before they are stored; the loop around the smallest block is longer
-    support_z: float = 3.0  # least z-score of the view itself: the filter alone would run on past a junction, or back before one
-    column_rad: float = 0.1  # heading per column of shift, between the mean (fov / columns) and the centre of a 90 deg image
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.closure_margin <= self.start_margin:
-            raise ValueError("place memory: 0 < closure_margin <= start_margin is required")
-        if self.waiting_views < 1 or self.column_rad <= 0.0:
-            raise ValueError("place memory: waiting_views and column_rad must be positive")
+from hippodrome.core.views.sequence import NO_EVIDENCE, Evidence, Peak, filter_step, peak, standardise
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,9 @@ import numpy as np
 
 from hippodrome.core import se2
 from hippodrome.core.mapping import networks
+from hippodrome.core.mapping.config import MapperConfig
 from hippodrome.core.mapping.experience_map import odometry_edges, relaxed_poses
-from hippodrome.core.mapping.mapper import MapperConfig, MappingError
+from hippodrome.core.mapping.mapper import MappingError
 from hippodrome.core.types import CognitiveMap, FloatArray, Observation, ViewCells, Visits
 from hippodrome.core.views import keyframes
 

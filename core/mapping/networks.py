@@ -8,32 +8,16 @@ follow from dead reckoning; and by then the typical way between keyframes is kno
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from hippodrome.core.attractors import grid_cells, head_direction
-from hippodrome.core.attractors.attractor import AttractorConfig
-from hippodrome.core.attractors.grid_cells import GRID_INFORMATION, GridState
+from hippodrome.core.attractors.grid_cells import GridState
 from hippodrome.core.attractors.head_direction import HeadDirectionState
+from hippodrome.core.mapping.config import MapperAttractorConfig
 from hippodrome.core.types import AttractorStates, FloatArray
-
-
-@dataclass(frozen=True)
-class MapperAttractorConfig:
-    """The mapper's networks, and how strongly a recognised place corrects them."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
-
-    head: AttractorConfig = field(default_factory=AttractorConfig)
-    grid: AttractorConfig = field(default_factory=lambda: AttractorConfig(information=GRID_INFORMATION))
-    injection_share: float = 0.1  # reliability that a recognised view injects, as a share of the information E
-    period_spacings: float = 20.0  # smallest period of the tori, in distances between two keyframes: about 100 m at 5 m
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.injection_share <= 1.0 or self.period_spacings <= 0.0:
-            raise ValueError("mapper attractor: injection_share must lie in (0, 1] and period_spacings be positive")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,32 +7,15 @@ as in least squares; then it narrows round by round, and closures that disagree 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, ClassVar
-
 import numpy as np
 from scipy.sparse import csr_array
 
 from hippodrome.core import se2
+from hippodrome.core.mapping.config import PoseGraphConfig
 from hippodrome.core.solvers.gauss_newton import factorise
 from hippodrome.core.solvers.pose_costs import local_residual
 from hippodrome.core.solvers.robust import geman_mcclure_weight
 from hippodrome.core.types import EdgeKind, Edges, FloatArray
-
-
-@dataclass(frozen=True)
-class PoseGraphConfig:
-    """The robust loss of the closures, and when to stop."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
-
-    robust_scale: float = 3.0  # error of a closure in sigmas at which its weight has fallen to a quarter
-    rounds: int = 15  # rounds of re-weighting the closures, each with one Gauss-Newton step
-    anneal: float = 4.0  # factor by which the squared width of the loss shrinks in each round, down to robust_scale
-
-    def __post_init__(self) -> None:
-        if self.robust_scale <= 0.0 or self.rounds < 1 or self.anneal <= 1.0:
-            raise ValueError("pose graph: robust_scale > 0, rounds >= 1 and anneal > 1 are required")
 
 
 def relax_pose_graph(poses: FloatArray, edges: Edges, config: PoseGraphConfig) -> FloatArray:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from hippodrome.core.types import ViewCells
-from hippodrome.core.views.descriptors import Descriptor, ViewCellConfig
+from hippodrome.core.views.config import ViewCellConfig
+from hippodrome.core.views.descriptors import Descriptor
 from hippodrome.core.views.scoring import ViewCellBank, make_bank, template_mean
 
 FIRST_ROOM = 64  # templates that there is room for at first; the room doubles when it is full

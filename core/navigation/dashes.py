@@ -15,7 +15,7 @@ from numba import njit
 
 from hippodrome.core.reading.config import ReaderConfig
 from hippodrome.core.types import FloatArray, Frame
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.config import CameraGeometry
 
 NEAR_M, FAR_M, STEP_M = 3.7, 12.5, 0.1  # ahead of the rear axle; beyond it a pixel spans more than a metre
 ASIDE_M = np.linspace(-0.3, 0.3, 7)  # about where the line is expected

@@ -32,7 +32,7 @@ from hippodrome.core.navigation.border import (
 )
 from hippodrome.core.navigation.sweep import drivable
 from hippodrome.core.types import FloatArray, Frame, UInt8Array
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.config import CameraGeometry
 
 CELLS = 400  # along each side: 80 m, in which the vehicle is kept 20 m away from the rim
 SHIFT_M = 20.0

@@ -13,12 +13,12 @@ A hypothesis is a row (a, b, x, y) with a = s cos(r) and b = s sin(r), s being m
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from hippodrome.core import se2
+from hippodrome.core.refinement.config import AlignmentConfig
 from hippodrome.core.roads.geometry import RoadGeometry, poses_on_segments
 from hippodrome.core.types import FloatArray, IntArray, StartPose
 
@@ -27,29 +27,6 @@ _STEP_SHARE = 0.05  # sigma of an ICP step in a and b, as a share of the scale: 
 _STEP_M = 30.0  # the same in translation
 _OTHER_SCALE = 0.03  # relative difference in scale from which an alignment counts as another one
 _OTHER_TURN_RAD = 0.05  # difference in rotation from which it does
-
-
-@dataclass(frozen=True, slots=True)
-class AlignmentConfig:
-    """How the similarity between map and network is searched for."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
-
-    min_scale_m: float = 0.2  # metres per map unit, lower end: monocular maps are off by a factor, not by orders of magnitude
-    max_scale_m: float = 5.0
-    scale_step: float = 0.04  # relative step between the scales tried: 2 % are 6 m at 300 m from the start, within reach of ICP
-    max_turn_rad: float = 0.6  # largest rotation tried against the start heading: heading drift, and a wrong start heading
-    turn_step_rad: float = 0.06
-    first_prefix: int = 200  # vertices that hypotheses are first scored on: about 1 km, with some turns in every town
-    kept: tuple[int, ...] = (160, 60, 24, 12)  # hypotheses kept in each round; the last number holds for all later rounds
-    truncation_m: float = 30.0  # a vertex farther than this from any fitting road counts as if it were at this distance
-    heading_lever_m: float = 25.0  # metres that a heading error of 1 rad counts as in the distance from a road
-    max_misfit: float = 0.75  # largest mean distance, as a share of truncation_m; maps laid out at random reach 0.6-0.7
-    trimmed_share: float = 0.85  # share of the vertices that an ICP step uses: the rest may lie on roads that the network lacks
-    icp_steps: int = 6
-    road_sigma_m: float = 5.0  # sigma of a well aligned vertex's distance from its road
-    bend_sigma_m: float = 10.0  # sigma of the first vertex's distance from the start pose: the best similarity of a bent map
-    scored_vertices: int = 150  # evenly spaced vertices of the prefix that are used: enough to rank hypotheses
 
 
 @dataclass(frozen=True, slots=True, eq=False)

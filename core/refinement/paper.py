@@ -11,15 +11,15 @@ Where the paper is silent:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from hippodrome.core import se2
-from hippodrome.core.matching.hmm.match import MatchedPath, PaperMatchConfig, match
-from hippodrome.core.refinement.alignment import Alignment, AlignmentConfig, align, apply
+from hippodrome.core.matching.hmm.match import MatchedPath, match
+from hippodrome.core.refinement.alignment import Alignment, align, apply
+from hippodrome.core.refinement.config import PaperRefineConfig
 from hippodrome.core.refinement.edges import edges_where
 from hippodrome.core.roads.geometry import RoadGeometry, road_geometry
 from hippodrome.core.roads.network import RoadNetwork
@@ -28,29 +28,6 @@ from hippodrome.core.solvers.pose_costs import global_residual, local_residual, 
 from hippodrome.core.types import CognitiveMap, EdgeKind, Edges, FloatArray, Refinement, RoadMatch, StartPose
 
 DAMPING = 1e-6  # holds what no match determines; against the weight of one matched vertex it moves nothing
-
-
-@dataclass(frozen=True, slots=True)
-class PaperRefineConfig:
-    """Constants of refinement mode ``paper``."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
-
-    alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
-    matching: PaperMatchConfig = field(default_factory=PaperMatchConfig)
-    rounds: int = 4  # times that match and optimise alternate; each undoes some of the along-track error of the last projection
-    local_weight: float = 1.0  # w_l of Eq. (12), the weight of the map's edges
-    global_weight: float = (
-        0.16  # w_g of Eq. (12), the weight of the roads, 1/m^2: a vertex 2.5 m from its matched position costs 1
-    )
-    closure_gate_sigma: float = 4.0  # closures that the map's own poses contradict by more sigmas than this are left out
-    min_sigma: tuple[float, float, float] = (0.05, 0.05, 0.005)  # least sigma of an edge: map units, map units, rad
-    max_iterations: int = 20
-    bent_cost: float = 2.0  # J per vertex above which a map counts as too bent for one similarity and is grown from its beginning
-    growth_prefix: int = 300  # vertices laid on the roads as one piece when growing: they tell the scale and have hardly drifted
-    growth_step: int = 10  # vertices by which the map grows: over 50 m it runs off by less than the distance between roads
-    growth_window: int = 80  # last vertices, which are still bent and tell the local scale; those farther back have settled
-    growth_rounds: int = 2
 
 
 def refine_paper(cognitive_map: CognitiveMap, network: RoadNetwork, start: StartPose, config: PaperRefineConfig) -> Refinement:

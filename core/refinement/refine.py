@@ -2,26 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import ClassVar, Literal
-
-from hippodrome.core.refinement.paper import PaperRefineConfig, refine_paper
-from hippodrome.core.refinement.route import RouteRefineConfig, refine_route
+from hippodrome.core.refinement.config import RefineConfig
+from hippodrome.core.refinement.paper import refine_paper
+from hippodrome.core.refinement.route import refine_route
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, HippodromeError, Refinement, StartPose
 
 LEAST_VERTICES = 2  # one place has no direction
-
-
-@dataclass(frozen=True, slots=True)
-class RefineConfig:
-    """``route``: unknown start and scale, right to decimetres. ``paper``: as published, needs a start pose."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
-
-    mode: Literal["route", "paper"] = "route"
-    route: RouteRefineConfig = field(default_factory=RouteRefineConfig)
-    paper: PaperRefineConfig = field(default_factory=PaperRefineConfig)
 
 
 def refine(

@@ -7,20 +7,19 @@ estimated, and the loop closures that agree with both.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from dataclasses import replace
 
 import numpy as np
 
-from hippodrome.core.matching.confidence import ConfidenceConfig, match_breaks, match_status, reject_displaced, reject_uncertain
+from hippodrome.core.matching.confidence import match_breaks, match_status, reject_displaced, reject_uncertain
 from hippodrome.core.matching.control import control_of
 from hippodrome.core.matching.lane_choice import choose_lanes, near_lane_changes, on_parallel_lanes
 from hippodrome.core.matching.route_line import RouteLine, route_line
-from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.problem import search_problem
 from hippodrome.core.matching.search.route import Route, most_likely_drive
+from hippodrome.core.refinement.config import RouteRefineConfig
 from hippodrome.core.refinement.edges import edges_where
-from hippodrome.core.refinement.solver import RouteSolution, SolverConfig, refine_along_route
+from hippodrome.core.refinement.solver import RouteSolution, refine_along_route
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import (
     CognitiveMap,
@@ -34,17 +33,6 @@ from hippodrome.core.types import (
     StartPose,
     UInt8Array,
 )
-
-
-@dataclass(frozen=True, slots=True)
-class RouteRefineConfig:
-    """Constants of refinement mode ``route``."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
-
-    search: RouteSearchConfig = field(default_factory=RouteSearchConfig)
-    confidence: ConfidenceConfig = field(default_factory=ConfidenceConfig)
-    solver: SolverConfig = field(default_factory=SolverConfig)
 
 
 def refine_route(

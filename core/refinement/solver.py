@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
 from hippodrome.core.matching.lane_choice import unknown_lane_sigma_m
 from hippodrome.core.matching.projection import reproject
 from hippodrome.core.matching.route_line import RouteLine
+from hippodrome.core.refinement.config import SolverConfig
 from hippodrome.core.refinement.covariance import posterior_covariance, with_systematic_errors
 from hippodrome.core.refinement.factors import State
 from hippodrome.core.refinement.map_error import MapErrorModel
@@ -29,20 +29,6 @@ from hippodrome.core.types import Edges, FloatArray, Visits
 MOST_CG_STEPS = 100  # iterations of conjugate gradients; 10-30 are usual, and the next round makes up for a step cut short
 
 _HELD_SIGMAS_M = (1000.0, 30.0)  # sigmas along a line that leaves the place on it open: they tell little and keep the condition
-
-
-@dataclass(frozen=True, slots=True)
-class SolverConfig:
-    """Rounds of the refinement along a route."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
-
-    along_sigma_m: tuple[float, ...] = (3.0, 6.0, 12.0, *[np.inf] * 8)  # sigma along the lane, per round; .inf: not held along it
-    inner_iterations: int = 2
-    reprojection_m: float = 4.0  # arc length by which a keyframe's place on the route may move in one round
-    unvouched_weight: float = 1e-6  # weight of the road where nothing vouches for it: it determines a pose without pulling it
-    survey_sigma_m: float | None = None  # sigma per axis of the error of the road network; None: what the network says of itself
-    survey_length_m: float = 60.0  # correlation length of that error: neighbouring roads are drawn wrong alike
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,8 +10,7 @@ compares them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
@@ -19,52 +18,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from hippodrome.core.types import Float32Array, Frame, Int8Array, UInt8Array
+from hippodrome.core.views.config import ViewCellConfig
 
-Kind: TypeAlias = Literal["gradient", "grey"]
 Descriptor: TypeAlias = Int8Array | UInt8Array  # (D,), or (C, D) for C of them
 
 GRADIENT_SCALE = 127.0  # a block-normalised histogram entry lies in [0, 1] and is stored as 0 to 127
 GREY_LEVELS_PER_SIGMA = 42.0  # a normalised pixel within 3 sigma of its neighbourhood's mean spans the byte
-
-
-@dataclass(frozen=True)
-class ViewCellConfig:
-    """How a frame becomes a template, and how two templates are compared."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
-
-    kind: Kind = "gradient"
-    top: float = 0.2  # where the used part of the frame begins, as a share of its height; above is sky
-    bottom: float = 0.7  # where the used part of the frame ends, as a share of its height; below is road, alike everywhere
-    gradient_px: tuple[int, int] = (32, 64)  # rows and columns of the image that gradients are taken on
-    cell_px: int = 4  # side of a histogram cell in pixels of that image; must divide both its sides
-    bins: int = 8  # orientations of a histogram, over half a turn: opposite directions count as one
-    contrast_floor: float = 4.0  # grey levels; gradients below it are noise and are not amplified by the normalisation
-    gradient_shift: int = 1  # largest sideways shift in cells that is tried; 1 tolerates about 6 deg of yaw at 90 deg of view
-    grey_px: tuple[int, int] = (10, 60)  # rows and columns of a grey template; RatSLAM's
-    grey_patch_px: int = 7  # side of the neighbourhood that a grey pixel is normalised by
-    grey_shift: int = 4  # largest sideways shift in columns that is tried with grey templates
-    mean_horizon: int = 128  # views after which the running mean of the queries forgets: about 600 m, longer than a street
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.top < self.bottom <= 1.0:
-            raise ValueError(f"view cells: crop must satisfy 0 <= top < bottom <= 1, got top {self.top}, bottom {self.bottom}")
-        if self.cell_px < 1 or any(side % self.cell_px or side <= 0 for side in self.gradient_px):
-            raise ValueError(f"view cells: cell_px {self.cell_px} must divide gradient_px {self.gradient_px}")
-        if self.bins < 2 or self.mean_horizon < 1 or min(self.gradient_shift, self.grey_shift) < 0:
-            raise ValueError("view cells: bins >= 2, mean_horizon >= 1 and shifts >= 0 are required")
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the descriptor before flattening: (columns, rows, bins) for "gradient", (columns, rows) for "grey"."""
-        if self.kind == "grey":
-            return self.grey_px[1], self.grey_px[0]
-        return self.gradient_px[1] // self.cell_px, self.gradient_px[0] // self.cell_px, self.bins
-
-    @property
-    def max_shift(self) -> int:
-        """Largest sideways shift, in columns of ``shape``, that is tried when two templates are compared."""
-        return self.grey_shift if self.kind == "grey" else self.gradient_shift
 
 
 def describe(frame: Frame, config: ViewCellConfig) -> Descriptor:

@@ -9,36 +9,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from hippodrome.core.types import Float32Array, Int8Array, IntArray
-from hippodrome.core.views.descriptors import Descriptor, ViewCellConfig
+from hippodrome.core.views.config import SearchConfig, ViewCellConfig
+from hippodrome.core.views.descriptors import Descriptor
 from hippodrome.core.views.scoring import QUERY_SCALE, QueryMean, ViewCellBank, score, shifted_queries
 
 CHUNK = 8192  # views projected at once: bounds the memory while the index is made
 
 Query: TypeAlias = tuple[Descriptor, QueryMean]  # a descriptor (D,), and the running mean to subtract from it
-
-
-@dataclass(frozen=True)
-class SearchConfig:
-    """When views are searched by sketches, and how thoroughly."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
-
-    exhaustive_cells: int = 12_000  # maps of up to this many views are searched exhaustively, which then is as fast: 4 ms
-    sketch_size: int = 96  # bytes per sketch; 32 lose one best match in ten, 64 one in fifty, 128 one in two hundred
-    candidates: int = 2_000  # views with the best sketches that are scored in full: one in fifty at 100,000 views
-    hypotheses: int = 256  # best cells after the last view whose successors along the road are scored in full, too
-    sample: int = 2_000  # evenly spread views that tell the mean and spread of all scores, to 2 % of a standard deviation
-
-    def __post_init__(self) -> None:
-        if min(self.exhaustive_cells, self.sketch_size, self.candidates, self.hypotheses, self.sample) < 1:
-            raise ValueError("search: exhaustive_cells, sketch_size, candidates, hypotheses and sample must be at least 1")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

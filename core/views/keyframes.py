@@ -10,31 +10,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
 import numpy as np
 from numba import njit
 
 from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, IntArray, Observation
+from hippodrome.core.views.config import KeyframeConfig
 
 BINS_PER_E = 20  # bins of the histogram of log speed per factor of e: 5 % of speed each
 HALF_RANGE = 256  # bins on either side of the first speed: a factor of e^12.8
-
-
-@dataclass(frozen=True)
-class KeyframeConfig:
-    """How densely keyframes follow one another."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
-
-    interval_s: float = 0.6  # between keyframes on a straight road at the median moving speed: about 5 m at 30 km/h
-    turn_rad: float = math.radians(10.0)  # turn after which a keyframe is due anyway: turning changes the view faster than travel
-    moving_share: float = 0.2  # share of the 90th percentile of speed below which the vehicle stands and speed is noise
-
-    def __post_init__(self) -> None:
-        if self.interval_s <= 0.0 or self.turn_rad <= 0.0 or not 0.0 < self.moving_share < 1.0:
-            raise ValueError("view step: interval_s and turn_rad must be positive, moving_share within (0, 1)")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

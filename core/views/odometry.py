@@ -15,15 +15,15 @@ tells nothing of the shift and is taken out before.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, TypeAlias
+from dataclasses import replace
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from hippodrome.core.types import Float32Array, FloatArray, Frame, Observation
-from hippodrome.core.views.egomotion.camera import RoadCamera
+from hippodrome.core.views.config import NEAR_M, CameraGeometry
 from hippodrome.core.views.egomotion.odometry import RoadOdometry
 from hippodrome.core.views.peaks import peak_in_row
 
@@ -43,7 +43,7 @@ WIDEST_RAD = 0.35  # largest turn between two frames: full lock at 7 m/s and 5 H
 SEARCHES = ((WIDEST_RAD, 71), (0.01, 21), (0.002, 21))  # half width and number of the turns tried, from coarse to fine
 
 # the distance
-NEAR_M, FAR_M, ASIDE_M, PIXEL_M = 2.4, 11.0, 4.0, 0.1  # the road seen from above; beyond 11 m a pixel of the frame spans a metre
+FAR_M, ASIDE_M, PIXEL_M = 11.0, 4.0, 0.1  # the road seen from above; beyond 11 m a pixel of the frame spans a metre
 TEMPLATE_M = 4.5  # length of the template: what both views from above share after the longest step, of 4 m
 BESIDE_PX = 8  # pixels by which the template is narrower on either side ..
 PLAY_PX = 2  # .. and by how many of them it may be off sideways: the lateral error of a turn
@@ -53,36 +53,6 @@ LARGEST_CHANGE_M = 0.4  # largest change of the step: full braking, 10 m/s^2 at 
 LEAST_STEP_M = 0.25  # a shorter step shows mostly how well the image agrees with itself
 LEAST_CORRELATION = 0.35  # a worse agreement is chance
 FIRST_STEP_M = 1.0  # expected before the first step is known
-LEVEL_SIGMA = 0.01  # tangent by which a camera that is said to look straight ahead and level does not
-
-
-@dataclass(frozen=True)
-class CameraGeometry:
-    """Where the camera sits on the vehicle. It looks straight ahead and level."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
-
-    fov_deg: float = 90.0  # horizontal field of view
-    height_m: float = 1.4  # height of the camera above the road; it gives the distances their unit
-    forward_m: float = 1.6  # distance of the camera ahead of the rear axle
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.fov_deg < 180.0 or self.height_m <= 0.0:
-            raise ValueError(f"camera: fov_deg must lie in (0, 180), height_m be positive, got {self.fov_deg}, {self.height_m}")
-
-    def focal_px(self, width_px: int) -> float:
-        """Focal length in pixels of frames of this width."""
-        return 0.5 * width_px / math.tan(0.5 * math.radians(self.fov_deg))
-
-    def sees_road_ahead(self, width_px: int, height_px: int) -> bool:
-        """Whether frames of this size show the road from ``NEAR_M`` on."""
-        return self.focal_px(width_px) * self.height_m / NEAR_M <= 0.5 * (height_px - 1)
-
-    def on_road(self, width_px: int, height_px: int) -> RoadCamera:
-        """The camera, with frames of this size, as the room ``egomotion`` takes it. It is known to be mounted straight."""
-        focal_px = self.focal_px(width_px)
-        matrix = np.array([[focal_px, 0.0, 0.5 * (width_px - 1)], [0.0, focal_px, 0.5 * (height_px - 1)], [0.0, 0.0, 1.0]])
-        return RoadCamera(matrix, self.height_m, self.forward_m, heading_sigma=LEVEL_SIGMA)
 
 
 class VisualOdometry:

@@ -16,7 +16,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from hippodrome.core.types import Float32Array, IntArray, ViewCells
-from hippodrome.core.views.descriptors import Descriptor, Kind, ViewCellConfig
+from hippodrome.core.views.config import Kind, ViewCellConfig
+from hippodrome.core.views.descriptors import Descriptor
 
 QUERY_SCALE = 2047.0  # largest entry of a query as int16: a sum of D products 127 * 2047 stays within int32 for D <= 8000
 

@@ -8,41 +8,15 @@ paths that it has driven, the localizer to all paths that the geometry of the fi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from hippodrome.core.types import Float32Array, IntArray
+from hippodrome.core.views.config import SequenceConfig
 from hippodrome.core.views.graph import Links, Paths, Predecessors, empty_walk, neighbourhood, walk_back_into
-
-
-@dataclass(frozen=True)
-class SequenceConfig:
-    """Constants of the sequence filter. Lengths are in units of the view spacing, so that nothing depends on the map's scale."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid"}
-
-    memory: float = 0.6  # lambda, the weight of earlier evidence: about three views; longer chains run straight on at junctions
-    length_tolerance: float = 0.6  # largest difference of a path's length to the way driven: 2 to 8 m fit at a spacing of 5 m
-    turn_tolerance_rad: float = 0.5  # largest difference of a path's turn to the turn driven: tells the legs of a junction apart
-    neighbourhood: float = 3.0  # cells closer than this to the best one show the same place and are no rivals
-    min_cells: int = 30  # fewer cells make no statistics, and give no evidence: the spread of a handful is next to nothing
-    sigma_floor: float = 0.03  # smallest spread of cosine similarities to divide by: that of pure noise in 1,024 dimensions
-    grey_sigma_floor: float = 1.0  # smallest spread of similarities of kind "grey" to divide by, in grey levels
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.memory < 1.0:
-            raise ValueError(f"sequence: memory must lie in [0, 1), got {self.memory}")
-        if min(self.length_tolerance, self.turn_tolerance_rad, self.neighbourhood, self.sigma_floor, self.grey_sigma_floor) <= 0:
-            raise ValueError("sequence: tolerances, neighbourhood and floors must be positive")
-        if self.min_cells < 2:
-            raise ValueError(f"sequence: min_cells must be at least 2, got {self.min_cells}")
-
-    def floor(self, kind: str) -> float:
-        """Smallest standard deviation to divide similarities by, for view cells of this kind."""
-        return self.sigma_floor if kind == "gradient" else self.grey_sigma_floor
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,7 +21,8 @@ from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
 from hippodrome.sim.net_cut import Around, cut_network, import_options
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import tour_graph
-from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.types import Town
 from hippodrome.sim.yaml_file import ScenarioError, load_yaml
 

@@ -10,8 +10,9 @@ from typing import Any, Final
 import yaml
 from pydantic import ValidationError
 
-from hippodrome.eval.authoring.keys import noise_keys, scenario_keys
+from hippodrome.eval.authoring.keys import key_paths, scenario_keys
 from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.self_motion import SelfMotionNoise
 from hippodrome.sim.yaml_file import ScenarioError, load_yaml, parse_yaml, read_yaml
 
 UNKNOWN: Final = "extra_forbidden"  # pydantic's name for a key that the model does not have
@@ -69,8 +70,8 @@ def _reason(one: Mapping[str, Any], place: str) -> str:
 def _known(place: str) -> list[str]:
     """All keys of the same depth as the unknown one, whether they hold a value or further keys."""
     depth = place.count(".") + 1
-    names = (key.path for key in (*scenario_keys(), *noise_keys()))
-    return sorted({".".join(path[:depth]) for path in names if len(path) >= depth})
+    paths = (*key_paths(Scenario), *(("noise", *path) for path in key_paths(SelfMotionNoise)))
+    return sorted({".".join(path[:depth]) for path in paths if len(path) >= depth})
 
 
 def _find(node: yaml.Node | None, location: Sequence[int | str]) -> tuple[int, str, yaml.Node | None]:

@@ -28,7 +28,15 @@ class HelpLayout(argparse.HelpFormatter):
 
 
 def add_command(
-    commands: Any, name: str, run: Command, summary: str, description: str, examples: Sequence[str], *, later_wins: bool = False
+    commands: Any,
+    name: str,
+    run: Command,
+    summary: str,
+    description: str,
+    examples: Sequence[str],
+    *,
+    later_wins: bool = False,
+    light: bool = False,
 ) -> argparse.ArgumentParser:
     """Add a command to a parser's sub-parsers.
 
@@ -40,10 +48,23 @@ def add_command(
         description: What it does, what goes in and what comes out, in paragraphs.
         examples: Command lines that work.
         later_wins: Whether an option may be added once more, in place of the one before: options shared with another command.
+        light: Whether it never uses OpenCV, which then is not loaded, so that it answers at once.
     """
     parser = _add_parser(commands, name, summary, description, examples, "resolve" if later_wins else "error")
-    parser.set_defaults(command=run)
+    parser.set_defaults(command=run if light else _with_one_opencv_thread(run))
     return parser
+
+
+def _with_one_opencv_thread(run: Command) -> Command:
+    """The command in a process whose OpenCV uses one thread. What is checked before it need not wait for OpenCV to be loaded."""
+
+    def prepared(options: argparse.Namespace) -> int:
+        from hippodrome.eval.pool import one_opencv_thread
+
+        one_opencv_thread()
+        return run(options)
+
+    return prepared
 
 
 def add_group(commands: Any, name: str, summary: str, description: str, examples: Sequence[str]) -> Any:

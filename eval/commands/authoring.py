@@ -56,7 +56,7 @@ def add_scenario_command(commands: Any) -> None:
 
         Lists every error with file, line, key and cure, and what is odd about a network. Nothing is run or written. Exits with 2
         if a file cannot be used.""",
-        ["hippodrome scenario validate my-town.yaml"],
+        ["hippodrome scenario validate my-town.yaml"], light=True,
     )  # fmt: skip
     validate.add_argument("files", type=Path, nargs="+", metavar="FILE", help="a scenario's file")
 
@@ -78,13 +78,13 @@ def add_scenario_command(commands: Any) -> None:
         actions, "list", _list_scenarios, "list the scenarios that come with hippodrome",
         """Print a line for each scenario that comes with hippodrome: its name, and what it is. `hippodrome eval` and the other
         commands take the name in place of a file, as in `hippodrome eval towns/rural`.""",
-        ["hippodrome scenario list"],
+        ["hippodrome scenario list"], light=True,
     )  # fmt: skip
 
     add_command(
         actions, "schema", _schema, "print the JSON schema of a scenario",
         """Print the JSON schema of a scenario, with the meaning of each key. Editors complete and check with it.""",
-        ["hippodrome scenario schema > scenario.schema.json"],
+        ["hippodrome scenario schema > scenario.schema.json"], light=True,
     )  # fmt: skip
 
 

@@ -25,9 +25,9 @@ from hippodrome.eval.rivals.orbslam3.method import OrbSlam3
 from hippodrome.sim.record import ROLES, RecordingPlan, record
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import DriveSpec, Scenario
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town_spec import TownSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 TOWN: Final = TownSpec(kind="grid", width_m=150.0, height_m=150.0, road_km=0.9)
 WAY_M: Final = 250.0  # of each drive: about half a minute

@@ -11,7 +11,7 @@ import numpy as np
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.navigator import PoseSource
 from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, LocalizationStatus, Observation
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.config import CameraGeometry
 from hippodrome.sim.loop.types import Truth
 from hippodrome.sim.scenario import Scenario
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from hippodrome.core.refinement.refine import RefineConfig
+from hippodrome.core.refinement.config import RefineConfig
 from hippodrome.core.types import HippodromeError
 
 UNITS: Final = "metres_per_unit"  # name in a recording's manifest and a map's provenance

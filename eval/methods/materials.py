@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from hippodrome.core.refinement.refine import RefineConfig
+from hippodrome.core.refinement.config import RefineConfig
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError, StartPose, Trajectory
 from hippodrome.eval.files.scenarios import effective_configuration

@@ -16,7 +16,8 @@ from typing import Final
 
 import numpy as np
 
-from hippodrome.core.mapping.mapper import Mapper, MapperConfig
+from hippodrome.core.mapping.config import MapperConfig
+from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.types import Observation
 
 FORGET: Final = Path("/proc/self/clear_refs")

@@ -8,9 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
-from hippodrome.core.mapping.mapper import Mapper, MapperConfig
+from hippodrome.core.mapping.config import MapperConfig
+from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.mapping.motion_mapper import MotionMapper
-from hippodrome.core.refinement.refine import RefineConfig, refine
+from hippodrome.core.refinement.config import RefineConfig
+from hippodrome.core.refinement.refine import refine
 from hippodrome.core.types import CognitiveMap, LocalizationEstimate, Observation, Trajectory
 from hippodrome.eval.methods.materials import refine_config
 from hippodrome.eval.methods.method import DEAD_RECKONING, SEMI_METRIC, TOPOMETRIC, TOPOMETRIC_PAPER, Method, RefineMode

@@ -13,16 +13,19 @@ import numpy as np
 
 from hippodrome._folders import temporary_folder
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
-from hippodrome.core.mapping.mapper import Mapper, MapperConfig
-from hippodrome.core.refinement.refine import RefineConfig, refine
+from hippodrome.core.mapping.config import MapperConfig
+from hippodrome.core.mapping.mapper import Mapper
+from hippodrome.core.refinement.config import RefineConfig
+from hippodrome.core.refinement.refine import refine
 from hippodrome.core.types import HippodromeError, Observation, StartPose
 from hippodrome.eval.methods.stages import localize_recording, map_recording
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.self_motion import NOISE_LEVELS, sense_self_motion
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec, build_town
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 TOWN = TownSpec(kind="grid", width_m=150.0, height_m=150.0, road_km=0.9)
 RATE_HZ = 5.0  # of observations

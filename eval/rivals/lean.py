@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from hippodrome.core.mapping.mapper import Mapper, MapperConfig
-from hippodrome.core.refinement.refine import RefineConfig, refine
+from hippodrome.core.mapping.config import MapperConfig
+from hippodrome.core.mapping.mapper import Mapper
+from hippodrome.core.refinement.config import RefineConfig
+from hippodrome.core.refinement.refine import refine
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import StartPose
 from hippodrome.eval.rivals.ablation import MapperWithoutAttractor

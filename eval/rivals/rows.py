@@ -17,7 +17,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from hippodrome._files import write_atomically
-from hippodrome.core.mapping.mapper import MapperConfig
+from hippodrome.core.mapping.config import MapperConfig
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import AttractorStates, CognitiveMap, HippodromeError, Observation, Trajectory
 from hippodrome.eval.methods.method import NO_ATTRACTOR, RATSLAM

@@ -9,7 +9,7 @@ import numpy as np
 
 from hippodrome.core.types import FloatArray, IntArray
 from hippodrome.sim.scene.blocks import GROUND_M, blocks_seen, is_drawn_whole, town_near
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.scene.light import colour, extinction_per_m, grain, haze_rgb, light_of, sky_dome
 from hippodrome.sim.scene.mesh import Mesh, merge
 from hippodrome.sim.scene.town_mesh import block_mesh, land_of, town_mesh

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from hippodrome.core.types import Float32Array, FloatArray, UInt8Array
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.scene.mesh import Mesh, Surface
 from hippodrome.sim.scene.types import Light, Tile
 

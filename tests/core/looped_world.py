@@ -11,7 +11,8 @@ from hippodrome.core.types import (
     ViewCells,
     Visits,
 )
-from hippodrome.core.views.descriptors import ViewCellConfig, describe
+from hippodrome.core.views.config import ViewCellConfig
+from hippodrome.core.views.descriptors import describe
 from hippodrome.core.views.scoring import template_mean
 
 CORNER_M, STRAIGHT_M = 20.0, (220.0, 160.0)  # radius of the corners, lengths of the sides between them

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from hippodrome.core.mapping.mapper import Mapper, MapperConfig
+from hippodrome.core.mapping.config import MapperConfig
+from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.types import EdgeKind
 from hippodrome.eval.cli import main
 from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED

@@ -121,6 +121,19 @@ def test_help_waits_for_no_simulator():
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.parametrize("text", ["name: [", "name: a\nseeed: 3\ncamera: {rate_hz: fast}\n"])
+@pytest.mark.parametrize("words", [["scenario", "validate"], ["eval"], ["render"], ["sweep"]])
+def test_faults_of_a_scenario_wait_for_no_algorithm_and_no_simulator(words, text, tmp_path):
+    path = tmp_path / "broken.yaml"
+    path.write_text(text)
+    heavy = {"cv2", "google.protobuf", "highway_env", "libsumo", "matplotlib", "numba", "pyproj", "pyrender", "rich", "scipy",
+             "shapely", "sumolib", "trimesh"}  # fmt: skip
+    call = f"from hippodrome.eval.cli import main; status = main({[*words, str(path)]})"
+    code = f"import sys; {call}; print(status, sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert done.stdout.strip() == f"{BAD_INPUT} []" and f"{path}:" in done.stderr
+
+
 @pytest.mark.parametrize("command", ["eval", "render", "stress", "robustness", "sweep"])
 def test_faults_of_a_scenario_are_said_as_validate_says_them_all_at_once(command, tmp_path, capsys):
     path = tmp_path / "broken.yaml"

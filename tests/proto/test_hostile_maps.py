@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from maps import random_map
 
-from hippodrome.core.refinement.refine import RefineConfig, refine
+from hippodrome.core.refinement.config import RefineConfig
+from hippodrome.core.refinement.refine import refine
 from hippodrome.core.types import HippodromeError, StartPose
 from hippodrome.proto import codec
 from hippodrome.proto.codec import load_map, save_map
-from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
 
 
 def forged(path, cognitive_map, monkeypatch):

@@ -10,9 +10,9 @@ from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.lane_log import LaneLog, lane_pieces
 from hippodrome.sim.network import edge_links, read_network
 from hippodrome.sim.sumo_tools import run_tool
-from hippodrome.sim.tour import TourSpec
+from hippodrome.sim.tour_spec import TourSpec
 from hippodrome.sim.town import read_town
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 TWO_LANES = """<net version="1.20">
 <edge id=":J_1" function="internal">

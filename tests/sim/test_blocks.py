@@ -9,7 +9,7 @@ from hippodrome.sim.render.renderer import FrameRenderer
 from hippodrome.sim.scene import blocks
 from hippodrome.sim.scene.blocks import BLOCK_M, SEEN_M, Block, blocks_seen
 from hippodrome.sim.scene.build import TILE_M, build_scene
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.scene.land import CELL_M
 from hippodrome.sim.scene.placement import clear_of, paved_area
 from tests.sim.test_scene import crossing

@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from hippodrome.sim.scene.conditions import Conditions, apply_camera
+from hippodrome.sim.scene.conditions import apply_camera
+from hippodrome.sim.scene.conditions_spec import Conditions
 
 
 def _rng():

@@ -7,12 +7,12 @@ import shapely
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.ego_spec import LENGTH_M, REAR_AXLE_TO_FRONT_M, EgoSpec
 from hippodrome.sim.scene.build import build_scene
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.scene.placement import clear_of, paved_area, rectangles, turning_places
 from hippodrome.sim.sumo_tools import run_tool
-from hippodrome.sim.tour import TourSpec
+from hippodrome.sim.tour_spec import TourSpec
 from hippodrome.sim.town import read_town
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 NODES = {"a": (0, 0), "b": (100, 0), "c": (100, 100), "d": (0, 100), "m": (50, 0), "e": (50, -60), "x": (160, 20)}
 STREETS = ("am", "mb", "bc", "cd", "da", "me", "bx")

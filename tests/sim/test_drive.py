@@ -12,9 +12,10 @@ from hippodrome.sim.drive import project_m, simulate_drive
 from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.lane_log import LaneLog, driven_edges, lane_pieces, lanes_ahead
 from hippodrome.sim.path import centreline
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec, build_town
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 GAMES = Path(sumo.SUMO_HOME) / "tools" / "game"
 TOWNS = {

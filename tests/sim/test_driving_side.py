@@ -17,9 +17,10 @@ from hippodrome.sim.keep_left_places import keeps_left_at
 from hippodrome.sim.map_import import sumo_network
 from hippodrome.sim.scene.lanes import Beside, beside, cut_lanes
 from hippodrome.sim.sumo_tools import run_tool
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec, build_town, read_town
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town import build_town, read_town
+from hippodrome.sim.town_spec import TownSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 PARIS, BRISTOL, SINGAPORE = (48.85, 2.35), (51.45, -2.6), (1.35, 103.85)
 

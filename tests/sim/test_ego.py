@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.se2 import wrap
 from hippodrome.sim.ego import LIMIT_LATERAL_MPS2, MAX_STEERING_RAD, EgoCar, follow, wander_m
-from hippodrome.sim.ego_spec import EgoSpec, comfortable_speed_mps
+from hippodrome.sim.ego_spec import EgoSpec
+from hippodrome.sim.ego_speed import comfortable_speed_mps
 from hippodrome.sim.path import MAX_CURVATURE_1PM, STEP_M, Path, Piece, sample_count, smooth_path
 
 

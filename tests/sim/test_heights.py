@@ -14,16 +14,17 @@ from hippodrome.sim.render.camera import CameraSpec, camera_position_m, camera_t
 from hippodrome.sim.render.renderer import FrameRenderer
 from hippodrome.sim.render.vehicles import vehicle_mesh
 from hippodrome.sim.scene.build import build_scene
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.scene.lanes import cut_lanes
 from hippodrome.sim.scene.light import light_of
 from hippodrome.sim.scene.placement import rectangles
 from hippodrome.sim.scene.relief import relief_of
 from hippodrome.sim.self_motion import SelfMotionNoise, sense_self_motion
 from hippodrome.sim.sumo_tools import run_tool
-from hippodrome.sim.tour import TourSpec
+from hippodrome.sim.tour_spec import TourSpec
 from hippodrome.sim.town import build_town, read_town
-from hippodrome.sim.traffic import VEHICLE_SIZES_M, TrafficSpec, traffic_at
+from hippodrome.sim.traffic import VEHICLE_SIZES_M, traffic_at
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 NODES = {"a": (0, 0), "b": (300, 0), "s": (150, -120), "n": (150, 120)}
 OVER = "0,0,0 60,0,0 120,0,6 180,0,6 240,0,0 300,0,0"  # a slope of one in ten, above the street from s to n

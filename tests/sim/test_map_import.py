@@ -15,7 +15,8 @@ from hippodrome.sim.netconvert_notes import netconvert_notes
 from hippodrome.sim.network import read_network
 from hippodrome.sim.opendrive import with_arcs_for_arcs
 from hippodrome.sim.sumo_tools import run_tool
-from hippodrome.sim.town import TownSpec, build_town, read_town
+from hippodrome.sim.town import build_town, read_town
+from hippodrome.sim.town_spec import TownSpec
 
 CORNERS = [(50.0, 8.0), (50.0, 8.004), (50.002, 8.004), (50.002, 8.0)]
 NODES = "".join(f'<node id="{i}" version="1" lat="{lat}" lon="{lon}"/>' for i, (lat, lon) in enumerate(CORNERS, 1))

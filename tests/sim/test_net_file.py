@@ -11,7 +11,8 @@ from hippodrome.sim import sumo_tools
 from hippodrome.sim.net_file import load_net
 from hippodrome.sim.network import read_network
 from hippodrome.sim.sumo_tools import check_that_sumo_reads, run_tool
-from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
 
 
 @pytest.fixture(scope="module")

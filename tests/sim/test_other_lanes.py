@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from hippodrome.sim.scene.build import build_scene
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.scene.placement import clear_of, other_lanes
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.town import read_town

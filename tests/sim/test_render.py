@@ -10,7 +10,7 @@ from hippodrome.sim.render.camera import CameraSpec, camera_position_m
 from hippodrome.sim.render.flat import visible_tiles
 from hippodrome.sim.render.renderer import FrameRenderer
 from hippodrome.sim.render.vehicles import vehicle_mesh
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.scene.light import light_of, sky_dome
 from hippodrome.sim.scene.types import Scene, Tile
 from hippodrome.sim.traffic import VEHICLE_SIZES_M

@@ -3,7 +3,7 @@
 import pytest
 
 from hippodrome.core.localization.config import LocalizerConfig
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.config import CameraGeometry
 from hippodrome.sim.scenario import Scenario
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.sim.scene.build import build_scene
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.scene.lanes import PIECE_M, Beside, beside, cut_lanes
 from hippodrome.sim.scene.light import colour, light_of, shade
 from hippodrome.sim.scene.mesh import Mesh, Surface, boxes, instances, merge, polygons

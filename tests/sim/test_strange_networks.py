@@ -8,9 +8,10 @@ import pytest
 from hippodrome.core.types import HippodromeError
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.ego_spec import EgoSpec
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec, build_town
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 from tests.sim import strange_networks
 
 BUILDERS = {

@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.sparse.csgraph import connected_components
 
-from hippodrome.sim.tour import TourSpec, coverage_and_revisits, plan_tour, tour_graph, toured_area
-from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.tour import coverage_and_revisits, plan_tour, tour_graph, toured_area
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,8 @@ from hippodrome.sim.network import drivable_edges, edge_lengths_m
 from hippodrome.sim.rural import MIN_RADIUS_M, rural_plan
 from hippodrome.sim.sumo_run import sumo_run
 from hippodrome.sim.sumo_tools import run_tool
-from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
 
 KINDS = ["rural", "grid", "radial", "random"]
 PLANS = {

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from hippodrome.sim.tour import tour_graph, toured_area
-from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.traffic import VEHICLE_SIZES_M, random_trip, traffic_at, vehicle_types_xml
 from hippodrome.sim.types import TrafficLog
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, TypeAlias
 
-from hippodrome.core.attractors.attractor import AttractorConfig, paper_config
-from hippodrome.core.attractors.grid_cells import GRID_INFORMATION
+from hippodrome.core.attractors.config import GRID_INFORMATION, AttractorConfig, paper_config
 
 Mode: TypeAlias = Literal["coupled", "paper", "kalman", "lanes"]
 

@@ -14,6 +14,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from hippodrome.core.attractors import grid_cells, head_direction
+from hippodrome.core.attractors.config import TURN
 from hippodrome.core.attractors.grid_cells import GridState
 from hippodrome.core.attractors.head_direction import HeadDirectionState
 from hippodrome.core.localization.beliefs.belief import NetworkActivity, network_activity
@@ -78,7 +79,7 @@ class PaperBelief:
         """
         paper = self.config.paper
         head = head_direction.stimulate(self.head, float(measurement.pose[2]), paper.strength * paper.head.information)
-        per_length = (grid_cells.TURN / paper.period_m) ** 2
+        per_length = (TURN / paper.period_m) ** 2
         reliability = np.full(2, paper.strength * paper.grid.information * per_length)
         grid = grid_cells.stimulate(self.grid, measurement.pose[:2], reliability)
         position_m, _ = grid_cells.read_out(grid, self.position_m if self.placed else measurement.pose[:2])

@@ -21,9 +21,9 @@ from hippodrome.eval.rivals.orbslam3.vocabulary import (
 from hippodrome.sim.record import RecordingPlan, record
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scenario import DriveSpec, Scenario
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town_spec import TownSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 KINDS: Final[tuple[Literal["grid", "radial", "random", "rural"], ...]] = ("grid", "radial", "random", "rural")
 FIRST_SEED: Final = 770_001  # of the training towns; scenarios use small seeds, and a town with the scenario's seed is left out

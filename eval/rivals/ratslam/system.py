@@ -13,7 +13,7 @@ import numpy as np
 
 from hippodrome.core.types import Edges, FloatArray, HippodromeError, IntArray, Observation, Trajectory, UInt8Array
 from hippodrome.core.views import keyframes
-from hippodrome.core.views.keyframes import KeyframeConfig
+from hippodrome.core.views.config import KeyframeConfig
 from hippodrome.eval.rivals.ratslam import pose_cells
 from hippodrome.eval.rivals.ratslam.experiences import ExperienceConfig, ExperienceMap
 from hippodrome.eval.rivals.ratslam.pose_cells import PoseCellConfig

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hippodrome.core.types import FloatArray, Frame, UInt8Array
-from hippodrome.core.views.descriptors import Descriptor, ViewCellConfig, describe
+from hippodrome.core.views.config import ViewCellConfig
+from hippodrome.core.views.descriptors import Descriptor, describe
 from hippodrome.core.views.scoring import QueryMean, best_over_shifts, make_bank, score
 
 

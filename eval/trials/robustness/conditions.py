@@ -8,9 +8,9 @@ from typing import Any, Final, TypeAlias
 
 from hippodrome.core.localization.beliefs.config import VISUAL_NOISE
 from hippodrome.core.types import HippodromeError
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.config import CameraGeometry
 from hippodrome.sim.scenario import Scenario
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 Change: TypeAlias = Callable[[Scenario], Scenario]
 

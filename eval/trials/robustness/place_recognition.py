@@ -21,9 +21,10 @@ from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.localization.recogniser import PlaceRecogniser
 from hippodrome.core.types import CognitiveMap, FloatArray, Frame, IntArray, UInt8Array
 from hippodrome.core.views import keyframes
-from hippodrome.core.views.descriptors import ViewCellConfig, describe
+from hippodrome.core.views.config import SequenceConfig, ViewCellConfig
+from hippodrome.core.views.descriptors import describe
 from hippodrome.core.views.scoring import QueryMean, make_bank, score, template_mean
-from hippodrome.core.views.sequence import SequenceConfig, Step
+from hippodrome.core.views.sequence import Step
 from hippodrome.eval.metrics.places import MAPPED_M, MAPPED_RAD, SAME_M, SAME_RAD
 from hippodrome.sim.recording import Recording
 

@@ -40,7 +40,7 @@ from hippodrome.sim.record import RecordingPlan, finish
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.survey import with_survey_error
-from hippodrome.sim.town import TownSpec
+from hippodrome.sim.town_spec import TownSpec
 
 STAGES: Final = (*RECORD_STAGES, "map", "localize", "methods", "places", "kidnap", "lengths")  # of each town
 ELSEWHERE_SEED: Final = 1_000  # added to the scenario's seed: another town of the same kind

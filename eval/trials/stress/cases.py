@@ -13,7 +13,8 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS, NoiseLevel, SelfMotionNoise
 from hippodrome.sim.sumo_tools import run_tool
-from hippodrome.sim.town import CONVERT_OPTIONS, TownSpec
+from hippodrome.sim.town import CONVERT_OPTIONS
+from hippodrome.sim.town_spec import TownSpec
 
 MISSING_ROADS: Final = 2  # driven streets that are taken out of the network, both directions of each
 FOREIGN_SEED: Final = 1_000_003  # added to the scenario's seed: a town of the same kind, where the drive never was

@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 from scipy.stats import multivariate_normal, norm
 
 from hippodrome.core.attractors import attractor
-from hippodrome.core.attractors.attractor import AttractorConfig, paper_config
+from hippodrome.core.attractors.config import AttractorConfig, paper_config
 from hippodrome.core.se2 import wrap_compiled
 
 angle = st.floats(-10.0, 10.0)

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from hippodrome.core.attractors import grid_cells
-from hippodrome.core.attractors.attractor import AttractorConfig, paper_config
+from hippodrome.core.attractors.config import GRID_INFORMATION, AttractorConfig, paper_config
 
-CONFIG = AttractorConfig(information=grid_cells.GRID_INFORMATION)
+CONFIG = AttractorConfig(information=GRID_INFORMATION)
 PERIODS = grid_cells.module_periods(97.0)
 coordinate = st.floats(-3e3, 3e3)
 position = st.tuples(coordinate, coordinate).map(np.array)
@@ -67,7 +67,7 @@ def test_bounded_injection_is_the_gaussian_product_per_axis():
 
 
 def test_paper_injection_pulls_the_read_out_by_its_share():
-    config = paper_config(grid_cells.GRID_INFORMATION)
+    config = paper_config(GRID_INFORMATION)
     state = grid_cells.inject(grid_cells.known(np.zeros(2), PERIODS, config), np.array([10.0, 0.0]), np.full(2, 0.1), config)
     mean = state.mean_rad[0, :, 0] * 97.0 / (2 * np.pi)
     assert_allclose(mean, [0.0, 5.0], atol=1e-2)  # calibration 0.1 against 0.1 injected
@@ -87,7 +87,7 @@ def test_populations_integrate_along_their_own_heading():
 
 def test_bounded_read_out_keeps_a_true_variance_and_paper_does_not():
     weak = np.full(2, 0.01)
-    for config, expected in ((CONFIG, 0.01), (paper_config(grid_cells.GRID_INFORMATION), 1.0)):
+    for config, expected in ((CONFIG, 0.01), (paper_config(GRID_INFORMATION), 1.0)):
         state = grid_cells.stimulate(grid_cells.uniform(PERIODS, config), np.array([5.0, 5.0]), weak)
         _, reliability = grid_cells.read_out(grid_cells.inhibit(state, 0.1, config), np.zeros(2))
         assert_allclose(reliability, expected, rtol=2e-2)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from hippodrome.core.attractors import head_direction
-from hippodrome.core.attractors.attractor import AttractorConfig, paper_config
+from hippodrome.core.attractors.config import AttractorConfig, paper_config
 from hippodrome.core.se2 import wrap_compiled
 
 CONFIG = AttractorConfig()

@@ -12,7 +12,7 @@ from hippodrome.core.localization.beliefs.motion import Motion, PoseMeasurement
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig, localize
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import HippodromeError, LocalizationStatus, Observation
-from hippodrome.core.views.index import SearchConfig
+from hippodrome.core.views.config import SearchConfig
 from tests.core.looped_world import Pictures, drive, loop_length, loop_pose, topometric_map
 
 PICTURES = Pictures(seed=3)

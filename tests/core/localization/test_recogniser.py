@@ -9,7 +9,7 @@ from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.localization.places import make_place_map
 from hippodrome.core.localization.recogniser import PlaceRecogniser
 from hippodrome.core.types import HippodromeError
-from hippodrome.core.views.descriptors import ViewCellConfig
+from hippodrome.core.views.config import ViewCellConfig
 from tests.core.looped_world import Pictures, topometric_map
 
 

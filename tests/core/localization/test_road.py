@@ -11,7 +11,7 @@ from hippodrome.core.localization.road import BEFORE_END_M, RoadSense
 from hippodrome.core.roads.geometry import road_geometry
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import HippodromeError
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.config import CameraGeometry
 from tests.core.looped_world import Pictures, topometric_map
 from tests.core.reading.painted import camera, road
 

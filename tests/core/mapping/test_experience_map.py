@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hippodrome.core import se2
+from hippodrome.core.mapping.config import ExperienceMapConfig
 from hippodrome.core.mapping.experience_map import (
     Closure,
-    ExperienceMapConfig,
     closure_edges,
     concatenated,
     odometry_edges,

@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hippodrome.core.mapping.experience_map import ExperienceMapConfig
-from hippodrome.core.mapping.mapper import (
-    Mapper,
-    MapperConfig,
-    MappingError,
-    map_drive,
-)
-from hippodrome.core.mapping.memory import PlaceMemoryConfig
+from hippodrome.core.mapping.config import ExperienceMapConfig, MapperConfig, PlaceMemoryConfig
+from hippodrome.core.mapping.mapper import Mapper, MappingError, map_drive
 from hippodrome.core.mapping.motion_mapper import MotionMapper
 from hippodrome.core.types import EdgeKind, Observation
-from hippodrome.core.views.descriptors import ViewCellConfig
+from hippodrome.core.views.config import ViewCellConfig
 
 LAP_M, DT_S, PIXELS_PER_M = 500.0, 0.1, 5
 CONFIG = MapperConfig()

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from hippodrome.core.mapping.memory import (
-    PlaceMemory,
-    PlaceMemoryConfig,
-)
-from hippodrome.core.views.descriptors import ViewCellConfig
+from hippodrome.core.mapping.config import PlaceMemoryConfig
+from hippodrome.core.mapping.memory import PlaceMemory
+from hippodrome.core.views.config import ViewCellConfig
 
 SPACING = 5.0
 

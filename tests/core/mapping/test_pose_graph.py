@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hippodrome.core import se2
-from hippodrome.core.mapping.pose_graph import PoseGraphConfig, edge_weights, relax_pose_graph
+from hippodrome.core.mapping.config import PoseGraphConfig
+from hippodrome.core.mapping.pose_graph import edge_weights, relax_pose_graph
 from hippodrome.core.types import EdgeKind, Edges
 
 SIGMA_ODOMETRY = np.array([0.1, 0.1, 0.02])  # alike along and across: GTSAM's error turns with the measured heading

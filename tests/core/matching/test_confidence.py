@@ -3,14 +3,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from hippodrome.core.matching.confidence import (
-    ConfidenceConfig,
-    distant_gap,
-    match_breaks,
-    match_status,
-    reject_displaced,
-    reject_uncertain,
-)
+from hippodrome.core.matching.confidence import distant_gap, match_breaks, match_status, reject_displaced, reject_uncertain
+from hippodrome.core.matching.config import ConfidenceConfig
 from hippodrome.core.matching.control import control_of
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.problem import search_problem

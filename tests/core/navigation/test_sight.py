@@ -9,7 +9,7 @@ import pytest
 from hippodrome.core.navigation.border import OTHER, PAINT, ROAD, UNKNOWN, borders
 from hippodrome.core.navigation.sight import Ground
 from hippodrome.core.navigation.sweep import STEP_M, STEPS, drivable
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.config import CameraGeometry
 
 CELL_M = 0.2
 CORNER = np.zeros(2)

@@ -16,7 +16,7 @@ from hippodrome.core.navigation.types import Lamp, Radar
 from hippodrome.core.navigation.watch import SensorHealth, watched
 from hippodrome.core.reading.types import LaneEnd, RoadReading
 from hippodrome.core.types import Observation
-from hippodrome.core.views.odometry import CameraGeometry
+from hippodrome.core.views.config import CameraGeometry
 
 DRIVE, VEHICLE, CAMERA = DriveConfig(), VehicleShape(), CameraGeometry()
 

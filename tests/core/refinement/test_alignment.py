@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 
 from hippodrome.core import se2
-from hippodrome.core.refinement.alignment import (
-    AlignmentConfig,
-    Similarity,
-    align,
-    apply,
-)
+from hippodrome.core.refinement.alignment import Similarity, align, apply
+from hippodrome.core.refinement.config import AlignmentConfig
 from hippodrome.core.roads.geometry import road_geometry
 from hippodrome.core.types import StartPose
 from tests.core.synthetic import grid_network, random_route, semi_metric_drive, true_path

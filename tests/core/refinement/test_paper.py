@@ -7,14 +7,8 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from hippodrome.core.matching.hmm.match import MatchedPath
-from hippodrome.core.refinement.paper import (
-    PaperRefineConfig,
-    metric_edges,
-    minimise_topometric_cost,
-    refine_paper,
-    trusted_edges,
-    without_closures,
-)
+from hippodrome.core.refinement.config import PaperRefineConfig
+from hippodrome.core.refinement.paper import metric_edges, minimise_topometric_cost, refine_paper, trusted_edges, without_closures
 from hippodrome.core.types import EdgeKind, MatchStatus, StartPose
 from tests.core.synthetic import grid_network, semi_metric_drive
 

@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hippodrome.core.refinement.refine import RefineConfig, refine
+from hippodrome.core.refinement.config import RefineConfig
+from hippodrome.core.refinement.refine import refine
 from hippodrome.core.types import HippodromeError, StartPose
 from tests.core.synthetic import grid_network, semi_metric_drive
 

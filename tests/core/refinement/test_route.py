@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from hippodrome.core.mapping.motion_mapper import MotionMapper
-from hippodrome.core.refinement.route import RouteRefineConfig, refine_route
+from hippodrome.core.refinement.config import RouteRefineConfig
+from hippodrome.core.refinement.route import refine_route
 from hippodrome.core.se2 import compose, wrap
 from hippodrome.core.types import EdgeKind, MatchStatus, Observation, Visits
 from tests.core.matching.drives import square_grid

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from hippodrome.core.views.descriptors import ViewCellConfig, describe
+from hippodrome.core.views.config import ViewCellConfig
+from hippodrome.core.views.descriptors import describe
 from tests.core.views.skyline import panorama
 
 KINDS = ["gradient", "grey"]

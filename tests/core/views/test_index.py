@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hippodrome.core.views.descriptors import ViewCellConfig
-from hippodrome.core.views.index import SearchConfig, candidates, index_of, search
+from hippodrome.core.views.config import SearchConfig, ViewCellConfig
+from hippodrome.core.views.index import candidates, index_of, search
 from hippodrome.core.views.scoring import make_bank, score, start_query_mean, template_mean
 
 VIEWS = ViewCellConfig()

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from hippodrome.core.types import Observation
 from hippodrome.core.views import keyframes
-from hippodrome.core.views.keyframes import KeyframeConfig
+from hippodrome.core.views.config import KeyframeConfig
 
 CONFIG = KeyframeConfig()
 

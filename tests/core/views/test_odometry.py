@@ -5,7 +5,8 @@ import pytest
 
 from hippodrome.core import se2
 from hippodrome.core.types import Observation
-from hippodrome.core.views.odometry import CameraGeometry, VisualOdometry
+from hippodrome.core.views.config import CameraGeometry
+from hippodrome.core.views.odometry import VisualOdometry
 
 CAMERA = CameraGeometry()
 ROWS, COLUMNS, ROOM_M, HIGH_M = 120, 160, 40.0, 12.0

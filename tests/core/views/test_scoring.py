@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hippodrome.core.types import ViewCells
-from hippodrome.core.views.descriptors import ViewCellConfig, describe
+from hippodrome.core.views.config import ViewCellConfig
+from hippodrome.core.views.descriptors import describe
 from hippodrome.core.views.scoring import (
     QueryMean,
     bank_of,

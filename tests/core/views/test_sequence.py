@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from hippodrome.core.views.config import SequenceConfig
 from hippodrome.core.views.graph import (
     CellGraph,
     Paths,
@@ -14,17 +15,7 @@ from hippodrome.core.views.graph import (
     neighbourhood,
     walk_back,
 )
-from hippodrome.core.views.sequence import (
-    NO_EVIDENCE,
-    Evidence,
-    SequenceConfig,
-    Step,
-    filter_step,
-    margin_over,
-    peak,
-    propagate,
-    standardise,
-)
+from hippodrome.core.views.sequence import NO_EVIDENCE, Evidence, Step, filter_step, margin_over, peak, propagate, standardise
 
 CONFIG = SequenceConfig(memory=0.5)
 

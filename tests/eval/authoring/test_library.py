@@ -7,7 +7,7 @@ import pytest
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.check import check_scenario
 from hippodrome.eval.files.scenarios import PACKAGE, portable, read_scenario
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from hippodrome.sim.self_motion import NOISE_LEVELS
 
 ROOT = Path(__file__).parents[3] / "scenarios"

@@ -14,7 +14,8 @@ from hippodrome.proto.codec import save_map
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import Recording, chunk_path, seal, write_arrays, write_chunk
 from hippodrome.sim.render.camera import CameraSpec
-from hippodrome.sim.town import TownSpec, build_town
+from hippodrome.sim.town import build_town
+from hippodrome.sim.town_spec import TownSpec
 from tests.proto.maps import random_map
 
 STEPS, RATE_HZ = 60, 10.0

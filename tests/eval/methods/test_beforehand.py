@@ -4,7 +4,7 @@ import argparse
 
 import pytest
 
-from hippodrome.core.refinement.refine import RefineConfig
+from hippodrome.core.refinement.config import RefineConfig
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.commands.arguments import accuracy_m, units
 from hippodrome.eval.methods.beforehand import UNITS, Beforehand, informed

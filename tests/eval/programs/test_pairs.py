@@ -13,9 +13,9 @@ from hippodrome.eval.programs.pairs import (
 from hippodrome.sim.record import RecordingPlan, close_renderer, draw_chunk, prepare
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scenario import DriveSpec, Scenario
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town_spec import TownSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 
 @pytest.fixture(scope="module")

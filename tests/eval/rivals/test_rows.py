@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from hippodrome.core.mapping.mapper import MapperConfig, map_drive
+from hippodrome.core.mapping.config import MapperConfig
+from hippodrome.core.mapping.mapper import map_drive
 from hippodrome.core.types import HippodromeError, Observation
 from hippodrome.eval.rivals.orbslam3.method import OrbSlam3
 from hippodrome.eval.rivals.rows import (
@@ -19,9 +20,9 @@ from hippodrome.eval.trials.rivals.stage import seen_as_needed
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.record import RecordingPlan, prepare
 from hippodrome.sim.scenario import DriveSpec, Scenario
-from hippodrome.sim.tour import TourSpec
-from hippodrome.sim.town import TownSpec
-from hippodrome.sim.traffic import TrafficSpec
+from hippodrome.sim.tour_spec import TourSpec
+from hippodrome.sim.town_spec import TownSpec
+from hippodrome.sim.traffic_spec import TrafficSpec
 
 
 def circling(laps, views=150):

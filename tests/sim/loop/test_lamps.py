@@ -9,7 +9,7 @@ from hippodrome.sim.loop.types import LanePlace
 from hippodrome.sim.loop.world import World
 from hippodrome.sim.render.renderer import FrameRenderer
 from hippodrome.sim.scene.build import build_scene
-from hippodrome.sim.scene.conditions import Conditions
+from hippodrome.sim.scene.conditions_spec import Conditions
 from tests.sim.loop import small
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hippodrome.core.matching.hmm.match import PaperMatchConfig, match
+from hippodrome.core.matching.hmm.config import PaperMatchConfig
+from hippodrome.core.matching.hmm.match import match
 from hippodrome.core.roads.geometry import road_geometry
 from hippodrome.core.types import MatchStatus
 from tests.core.synthetic import grid_network, lanes_of, random_route, true_path

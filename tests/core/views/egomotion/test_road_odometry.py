@@ -5,11 +5,12 @@ import pytest
 
 from hippodrome.core import se2
 from hippodrome.core.types import Observation
+from hippodrome.core.views.config import CameraGeometry
 from hippodrome.core.views.egomotion import focal
 from hippodrome.core.views.egomotion.camera import RoadCamera, working_image, working_matrix
 from hippodrome.core.views.egomotion.odometry import RoadOdometry
 from hippodrome.core.views.egomotion.static import StaticMap
-from hippodrome.core.views.odometry import CameraGeometry, VisualOdometry
+from hippodrome.core.views.odometry import VisualOdometry
 from tests.core.views.egomotion.street import Camera, picture
 
 LOW_AND_WIDE = Camera()  # the shape of a camera that looks over the road next to the vehicle

@@ -22,8 +22,8 @@ from hippodrome.eval.trials.robustness.targets import Target
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import DriveSpec, Scenario
-from hippodrome.sim.scene.conditions import Conditions
-from hippodrome.sim.tour import TourSpec
+from hippodrome.sim.scene.conditions_spec import Conditions
+from hippodrome.sim.tour_spec import TourSpec
 
 SCENARIO = Scenario(
     name="town", localization=DriveSpec(tour=TourSpec(length_m=900), conditions=Conditions(sun_azimuth_deg=10.0, gain=2.0))

@@ -59,9 +59,16 @@ def add_run_commands(commands: Any) -> None:
         """Make DIR/report.html anew from DIR/results.json and the files beside it, and print where it is.
 
         The report is one page that needs no network: tables, figures, an interactive map, and the worst places with their
-        frames.""",
+        frames. With --figures all figures of the run are gathered in a folder too, for a paper: as PDF and SVG, whose lines and
+        letters stay sharp at any size, and as PNG.""",
         ["hippodrome report out/eval",
-         "hippodrome report out/eval --open"],
+         "hippodrome report out/eval --open",
+         "hippodrome report out/eval --figures out/figures"],
+    )  # fmt: skip
+    report.add_argument(
+        "--figures", type=Path, metavar="FOLDER",
+        help="copy every figure to this new folder as SCENARIO-FIGURE.pdf, .svg and .png (default: they stay in the scenarios' "
+             "folders)",
     )  # fmt: skip
     report.add_argument("--open", action="store_true", help="show the page in the browser, too (default: say where it is)")
     report.add_argument(
@@ -88,6 +95,10 @@ def _report(options: argparse.Namespace) -> int:
 
     page = write_report(options.results)
     print(page)
+    if options.figures is not None:
+        from hippodrome.eval.report.export import export_figures
+
+        print("\n".join(export_figures(options.results, options.figures)))
     if options.open:
         show(page.resolve().as_uri())
     return DONE

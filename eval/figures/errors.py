@@ -35,7 +35,7 @@ def draw_error_profiles(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, 
         if scores:
             axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
     panels[1].set_xlabel("time (s)")
-    save_figure(figure, path, with_svg=True)
+    save_figure(figure, path, for_print=True)
 
 
 def draw_error_violins(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, Score], title: str = "") -> None:
@@ -52,7 +52,7 @@ def draw_error_violins(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, S
         axes.set_xticks(range(len(scores)), [method.replace(" ", "\n", 1) for method in scores], fontsize=8)
         axes.set_xlim(-0.6, len(scores) - 0.4)
         log_errors(axes, _together(scores))
-    save_figure(figure, path, with_svg=True)
+    save_figure(figure, path, for_print=True)
 
 
 def _violin(axes: Axes, place: int, errors_m: FloatArray, colour: str) -> None:

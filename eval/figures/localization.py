@@ -58,7 +58,7 @@ def draw_localization_error(
     log_errors(axes, errors_m)
     axes.set_xlim(t_s[0], t_s[-1])
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
-    save_figure(figure, path, with_svg=True)
+    save_figure(figure, path, for_print=True)
 
 
 def draw_localization_comparison(path: Path, scores: Mapping[str, LocalizationScore], title: str = "") -> None:
@@ -82,7 +82,7 @@ def draw_localization_comparison(path: Path, scores: Mapping[str, LocalizationSc
     tidy(axes, "time since the first frame (s); dotted: first fix", "position error (m)", title)
     log_errors(axes, np.concatenate([score.errors_m[score.localized] for score in scores.values()]))
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
-    save_figure(figure, path, with_svg=True)
+    save_figure(figure, path, for_print=True)
 
 
 def strip_steps(t_s: FloatArray, columns: int = 8) -> list[int]:

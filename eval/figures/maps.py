@@ -55,7 +55,7 @@ def draw_maps_over_truth(
     axes.autoscale_view()
     axes.set_title(title, loc="left", fontsize=10)
     _legend_below(figure, axes)
-    save_figure(figure, path, with_svg=True)
+    save_figure(figure, path, for_print=True)
 
 
 def draw_cognitive_map(path: Path, cognitive_map: CognitiveMap, title: str = "") -> None:
@@ -78,7 +78,7 @@ def draw_cognitive_map(path: Path, cognitive_map: CognitiveMap, title: str = "")
     frame_map(axes, f"x ({unit})", f"y ({unit})")
     axes.set_title(title, loc="left", fontsize=10)
     _legend_below(figure, axes)
-    save_figure(figure, path, with_svg=True)
+    save_figure(figure, path, for_print=True)
 
 
 def draw_error_map(
@@ -114,7 +114,7 @@ def draw_error_map(
     bar.minorticks_off()
     bar.outline.set_visible(False)
     axes.set_title(title, loc="left", fontsize=10)
-    save_figure(figure, path, with_svg=True)
+    save_figure(figure, path, for_print=True)
 
 
 def _legend_below(figure: Any, axes: Axes) -> None:

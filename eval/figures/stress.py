@@ -35,4 +35,4 @@ def draw_stress(path: Path, apes_m: Mapping[str, Sequence[float | None]]) -> Non
     axes.set_xticks(range(len(apes_m)), [name.replace(" ", "\n", 1) for name in apes_m], fontsize=8)
     axes.set_xlim(-0.6, len(apes_m) - 0.1)
     log_errors(axes, np.concatenate([*known, [1.0]]))
-    save_figure(figure, path, with_svg=True)
+    save_figure(figure, path, for_print=True)

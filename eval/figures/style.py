@@ -28,6 +28,10 @@ TRUTH, ROAD, FAINT = "#222222", "#c8c8c8", "#777777"
 SERIES: Final = (VERMILION, BLUE, GREEN, PURPLE, ORANGE, SKY, VIOLET)  # of methods, in the order in which they are given
 ERROR_MAP: Final = "viridis_r"  # large errors are dark, as they must stand out on white
 DPI = 130
+WITHOUT_DATE: Final[dict[str, dict[str, None]]] = {  # what a program usually notes in a file, by its format
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
 FLOOR_M = 0.01  # where logarithmic error axes begin
 
 
@@ -38,27 +42,28 @@ def new_figure(width_in: float, height_in: float) -> Any:
     return figure
 
 
-def save_figure(figure: Any, path: Path, *, with_svg: bool = False) -> None:
+def save_figure(figure: Any, path: Path, *, for_print: bool = False) -> None:
     """Write a figure as PNG, atomically, without date or program version in it.
 
     Args:
         figure: The figure.
         path: The PNG.
-        with_svg: Whether to write it as SVG too, beside the PNG, for print: letters stay letters, and nothing is pixels.
+        for_print: Whether to write it as SVG and PDF too, beside the PNG: letters stay letters, and nothing is pixels.
     """
     buffer = BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
     write_atomically(path, buffer.getvalue())
-    if with_svg:
-        write_atomically(path.with_suffix(".svg"), _as_svg(figure))
+    if for_print:
+        figure.set_layout_engine("none")  # the PNG has laid it out already
+        for kind, metadata in WITHOUT_DATE.items():
+            write_atomically(path.with_suffix(f".{kind}"), _drawn(figure, kind, metadata))
 
 
-def _as_svg(figure: Any) -> bytes:
-    """The figure as SVG; the same figure gives the same bytes."""
-    figure.set_layout_engine("none")  # the PNG has laid it out already
+def _drawn(figure: Any, kind: str, metadata: dict[str, None]) -> bytes:
+    """The figure as vectors; the same figure gives the same bytes."""
     buffer = BytesIO()
-    with rc_context({"svg.hashsalt": "hippodrome", "svg.fonttype": "none"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    with rc_context({"svg.hashsalt": "hippodrome", "svg.fonttype": "none", "pdf.fonttype": 42}):
+        figure.savefig(buffer, format=kind, metadata=metadata)
     return buffer.getvalue()
 
 

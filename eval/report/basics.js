@@ -1,7 +1,8 @@
 "use strict";
 // What every script of the report uses. No library, no network; text enters the page as textContent only.
 
-const COLOURS = ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"]; // Okabe and Ito, as in the figures
+const COLOURS = ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#5b3a9e"]; // Okabe and Ito, as in the figures
+const DRIVE_COLOURS = ["#56b4e9", "#8a63d2"]; // of the second drive, from the last method on
 const VIRIDIS = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
 const LOWEST_M = 0.1, HIGHEST_M = 100; // of the colour scale, the same on every map so that they compare
 const dark = matchMedia("(prefers-color-scheme: dark)");

@@ -43,7 +43,7 @@ function startMap(root) {
 
   function setUpControls() {
     const box = root.querySelector(".layers");
-    for (const layer of layers) {
+    for (const layer of [...layers.slice(0, 2), ...layers.slice(2).reverse()]) { // in the order of the tables
       const label = make("label"), input = make("input", undefined, { type: "checkbox", checked: layer.shown });
       const swatch = make("span", undefined, { className: "swatch" });
       swatch.style.background = layer.colour || `var(--${layer.kind === "roads" ? "road" : "truth"})`;

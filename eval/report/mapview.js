@@ -8,7 +8,7 @@ function mapLayers(data) {
     { name: "ground truth", kind: "truth", shown: true },
     ...data.methods.map((path, i) => ({ name: path.name, kind: "vertices", path, colour: COLOURS[i % COLOURS.length],
       shown: path.name === "semi-metric" || i === data.methods.length - 1 })),
-    ...data.drives.map((path) => ({ name: `second drive in ${path.name}`, kind: "drive", path, colour: COLOURS[5], shown: false })),
+    ...data.drives.map((path, i) => ({ name: `second drive in ${path.name}`, kind: "drive", path, colour: DRIVE_COLOURS[(data.drives.length - 1 - i) % DRIVE_COLOURS.length], shown: false })),
   ];
 }
 

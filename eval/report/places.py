@@ -108,7 +108,12 @@ def _list(facts: Sequence[str]) -> Html:
 
 def _link(town: str, drive: int, t_s: float) -> Html:
     """A link that opens the player at a time of one of the drives."""
-    return element("a", "Play from here", href=f"#town={quote(town, safe='')}&drive={drive}&t={t_s:.1f}")
+    return element("a", "Play from here", href=place_address(town, drive, t_s))
+
+
+def place_address(town: str, drive: int, t_s: float) -> str:
+    """The address, within the page, of a time of one of a town's drives."""
+    return f"#town={quote(town, safe='')}&drive={drive}&t={t_s:.1f}"
 
 
 def frame_tile(tiles: Thumbnails, t_s: float, kind: str = "tile") -> Html:

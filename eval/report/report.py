@@ -8,6 +8,7 @@ from typing import Final
 
 from hippodrome._files import write_atomically
 from hippodrome.eval.report.files import ScenarioFiles, read_scenario_files
+from hippodrome.eval.report.glance import at_a_glance
 from hippodrome.eval.report.markup import Html, element, joined
 from hippodrome.eval.report.pages import page
 from hippodrome.eval.report.player import towns
@@ -71,6 +72,8 @@ def _all_scenarios(results: Results, found: Sequence[ScenarioFiles]) -> Html:
         "section",
         element("p", _lede(results), class_="lede"),
         towns(results, found),
+        element("h2", "At a glance"),
+        at_a_glance(results, found),
         element("h2", "All scenarios"),
         overview(results, quoted_rows()),
         class_="panel",

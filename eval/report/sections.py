@@ -6,8 +6,6 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from pydantic import ValidationError
-
 from hippodrome.eval.report import comparison
 from hippodrome.eval.report.commands import command_lines
 from hippodrome.eval.report.evidence import MapEvidence
@@ -26,8 +24,7 @@ from hippodrome.eval.report.tables import (
 from hippodrome.eval.results.aligned import aligned_note
 from hippodrome.eval.results.model import Row, ScenarioResult
 from hippodrome.eval.results.tables import definitions, failed_runs, scenario_title, unscored_notes
-from hippodrome.eval.results.thresholds import failed_limits
-from hippodrome.sim.scenario import Thresholds
+from hippodrome.eval.results.thresholds import limits_missed
 
 MEANING = {"cpu_s": "s of CPU", "step_ms": "ms a step"}  # of a time, by the end of its name
 
@@ -88,26 +85,18 @@ def _folded(title: str, content: Child) -> Html:
 
 def _verdict(scenario: ScenarioResult) -> Html | None:
     """Whether the scenario's own limits hold."""
-    failed = _failed_limits(scenario)
+    failed = limits_missed(scenario)
     if failed is None:
         return None
     return element("span", "limits failed", class_="badge bad") if failed else element("span", "limits hold", class_="badge good")
 
 
 def _failures(scenario: ScenarioResult) -> Html | None:
-    lines = [f"Limit: {line}" for line in _failed_limits(scenario) or []]
+    lines = [f"Limit: {line}" for line in limits_missed(scenario) or []]
     lines += [f"{row.method} failed: {row.failure}" for row in scenario.rows if row.failure is not None]
     lines += [f"{row.method}: map refused: {row.refused}" for row in scenario.rows if row.refused is not None]
     lines += [*unscored_notes(scenario.rows), *failed_runs(scenario.rows)]
     return element("ul", [element("li", line) for line in lines], class_="failures") if lines else None
-
-
-def _failed_limits(scenario: ScenarioResult) -> list[str] | None:
-    limits = _extra(scenario, "configuration").get("thresholds")
-    try:
-        return failed_limits(Thresholds.model_validate(limits), scenario) if limits else None
-    except ValidationError:  # results of another version: their limits may have other names
-        return None
 
 
 def _extra(scenario: ScenarioResult, name: str) -> dict[str, Any]:

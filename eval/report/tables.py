@@ -66,8 +66,8 @@ def overview(results: Results, quoted: Sequence[Row]) -> Html:
     rows: list[Sequence[Child]] = [
         [
             element("a", scenario.name, href=f"#{anchor(place)}"),
-            *(_ape(_row(scenario, method)) for method in measured),
-            *(_location_error(_row(scenario, method)) for method in localizing),
+            *_best_marked([_ape(_row(scenario, method)) for method in measured]),
+            *_best_marked([_location_error(_row(scenario, method)) for method in localizing]),
             f"{scenario.network.km:.1f}",
             f"{scenario.duration_s:,.0f}",
             f"{scenario.frames:,}",
@@ -84,13 +84,13 @@ def anchor(place: int) -> str:
 
 
 def mapping_table(scenario: ScenarioResult, quoted: Sequence[Row]) -> Html:
-    """The paper's Table I with our rows above its own."""
-    return _row_table(MAPPING_COLUMNS, [*scenario.rows, *quoted], f"{scenario.name}: mapping")
+    """The paper's Table I with our rows above its own, in the order of the tiles: the last one is what a run is about."""
+    return _row_table(MAPPING_COLUMNS, [*reversed(scenario.rows), *quoted], f"{scenario.name}: mapping")
 
 
 def localization_table(scenario: ScenarioResult, quoted: Sequence[Row]) -> Html | None:
     """Localization from an unknown start (the paper's Table II); None if nothing was localized."""
-    rows = [row for row in (*scenario.rows, *quoted) if row.localization is not None]
+    rows = [row for row in (*reversed(scenario.rows), *quoted) if row.localization is not None]
     return _row_table(LOCALIZATION_COLUMNS, rows, f"{scenario.name}: localization") if rows else None
 
 
@@ -158,6 +158,14 @@ def _location_error(row: Row | None) -> Child:
         return NONE
     error_m = row.localization.error_mean_m
     return element("span", "never", class_="bad") if error_m is None else f"{error_m:.2f}"
+
+
+def _best_marked(cells: Sequence[Child]) -> list[Child]:
+    """Cells of methods in one town, of which the least figure is marked if there is more than one; a refused one never is."""
+    figures = [cell for cell in cells if type(cell) is str and cell != NONE]
+    least = min(figures, key=float, default=None)
+    several = len(figures) > 1
+    return [element("strong", cell, class_="good") if several and type(cell) is str and cell == least else cell for cell in cells]
 
 
 def _paper_line(quoted: Sequence[Row]) -> str:

@@ -2,6 +2,7 @@
 
 const TRACE_ROWS = [["head_reliability", "head direction"], ["grid_reliability", "grid cells"]];
 const RISE = 1.02; // between injections reliabilities only fall: a calibration population that is surer than before was injected into
+const WIDE_PX = 480; // from this width on there is room for all words
 const TRACE_LEFT = 8, TRACE_HEAD = 18;
 
 /** Mean of a population's reliabilities in a sample: even entries of pairs are the integrator's, odd ones the calibration's. */
@@ -44,7 +45,8 @@ function makeTraces(canvas) {
     const Y = (value) => top + tall - 6 - ((value - low) / Math.max(high - low, 1e-9)) * (tall - TRACE_HEAD - 10);
     const marks = injections(drawn);
     on.fillStyle = inks.soft;
-    on.fillText(`${name}: sure from ${sigma(10 ** low)} to ${sigma(10 ** high)}, log scale; ticks: ${marks.length} injections`, TRACE_LEFT, top + 12);
+    const range = `${sigma(10 ** low)} to ${sigma(10 ** high)}`, wide = `${name}: sure from ${range}, log scale; ticks: ${marks.length} injections`;
+    on.fillText(size.w < WIDE_PX ? `${name}: ${range}, ${marks.length} injections` : wide, TRACE_LEFT, top + 12);
     on.fillStyle = inks.accent;
     for (const i of marks) on.fillRect(X(drawn.t_s[i]), top + TRACE_HEAD, 1, 5);
     series.forEach((values, population) => {

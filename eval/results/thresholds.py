@@ -2,8 +2,20 @@
 
 from __future__ import annotations
 
+from pydantic import ValidationError
+
 from hippodrome.eval.results.model import Row, ScenarioResult
 from hippodrome.sim.scenario import Thresholds
+
+
+def limits_missed(result: ScenarioResult) -> list[str] | None:
+    """One line per limit of the scenario's own that does not hold; None if it has none, or none that this version can read."""
+    configuration = getattr(result, "configuration", None)
+    limits = configuration.get("thresholds") if isinstance(configuration, dict) else None
+    try:
+        return failed_limits(Thresholds.model_validate(limits), result) if limits else None
+    except ValidationError:  # results of another version: their limits may have other names
+        return None
 
 
 def failed_limits(limits: Thresholds, result: ScenarioResult) -> list[str]:

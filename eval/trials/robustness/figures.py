@@ -40,7 +40,7 @@ def draw_heat_map(path: Path, name: str, results: Sequence[ConditionResult]) -> 
     )
     axes.set_xlabel(legend, fontsize=8)
     axes.set_title(f"{name}: localization under other conditions", loc="left", fontsize=10)
-    save_figure(figure, path, with_svg=True)
+    save_figure(figure, path, for_print=True)
 
 
 def draw_curves(path: Path, name: str, results: Sequence[PlaceResult]) -> None:
@@ -62,7 +62,7 @@ def draw_curves(path: Path, name: str, results: Sequence[PlaceResult]) -> None:
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8, frameon=False)
     figure.suptitle(f"{name}: place recognition alone", x=0.01, ha="left", fontsize=10)
-    save_figure(figure, path, with_svg=True)
+    save_figure(figure, path, for_print=True)
 
 
 def _write_cell(axes: Axes, column: int, row: int, sequence: SequenceResult) -> None:

@@ -95,7 +95,7 @@ def test_every_figure_is_drawn_with_ink(tmp_path, name):
 def test_the_same_figure_has_the_same_bytes(tmp_path):
     for name in ("a.png", "b.png"):
         draw_maps_over_truth(tmp_path / name, network(), POSES, {"topometric": POSES})
-    for kind in ("png", "svg"):
+    for kind in ("png", "svg", "pdf"):
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
     assert b">topometric</text>" in (tmp_path / "a.svg").read_bytes(), "letters stay letters"
 

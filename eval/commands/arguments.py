@@ -185,6 +185,14 @@ def positive(text: str) -> int:
     return value
 
 
+def number_or_nan(text: str) -> float:
+    """The number that a text is; nan, which lies within no limits, where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
 def positive_number(text: str) -> float:
     """A finite number above 0."""
     value = float(text)
@@ -261,10 +269,7 @@ def units(text: str) -> float:
     """``metres``, or how many of them a unit of the odometry has."""
     if text == "metres":
         return 1.0
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_or_nan(text)
     if not 1e-6 <= value <= 1e6:
         raise argparse.ArgumentTypeError(f"'{text}' is neither metres nor a number of metres from 1e-6 to 1e6")
     return value
@@ -272,10 +277,7 @@ def units(text: str) -> float:
 
 def accuracy_m(text: str) -> float:
     """Metres from 0 on, below the width of a town."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_or_nan(text)
     if not 0.0 <= value <= 100.0:
         raise argparse.ArgumentTypeError(f"'{text}' is not a number of metres from 0 to 100")
     return value

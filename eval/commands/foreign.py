@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from hippodrome.eval.commands.arguments import number_or_nan
+
 
 def add_truth(parser: argparse.ArgumentParser, default: str) -> None:
     """The truth as a file, its projection and its accuracy."""
@@ -36,10 +38,7 @@ def offset(text: str) -> float | str:
     """Seconds to add to a clock, or ``auto``."""
     if text == "auto":
         return text
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
+    value = number_or_nan(text)
     if not abs(value) <= 1e11:
         raise argparse.ArgumentTypeError(f"'{text}' is neither auto nor a number of seconds")
     return value
@@ -52,10 +51,7 @@ def ahead(text: str) -> float | str:
 
 def metres_ahead(text: str, or_else: str = "") -> float:
     """Metres ahead of the rear axle; ``or_else`` is what an option takes as well."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
+    value = number_or_nan(text)
     if not abs(value) <= 1e4:
         raise argparse.ArgumentTypeError(f"'{text}' is not {or_else}a number from -10000 to 10000")
     return value
@@ -63,10 +59,7 @@ def metres_ahead(text: str, or_else: str = "") -> float:
 
 def rate(text: str) -> float:
     """A rate or a height, from 0.01 to 10000."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
+    value = number_or_nan(text)
     if not 0.01 <= value <= 10_000.0:
         raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0.01 to 10000")
     return value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,7 +13,9 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.drive.flight import TRACE
 from hippodrome.eval.drive.table import COLUMNS, cells
-from hippodrome.eval.report.markup import Html, element
+from hippodrome.eval.report.markup import Html, element, joined
+from hippodrome.eval.report.pages import TABLE_SCRIPTS, page
+from hippodrome.eval.report.tables import plain_table
 from hippodrome.eval.results.model import Results, ScenarioResult
 from hippodrome.sim.record import RecordingPlan
 
@@ -30,38 +31,32 @@ LEGEND: Final = (
     "knew where it was. Point at a way to read its number."
 )
 STYLE: Final = """
-.town { width: 100%; height: auto; max-height: 75vh; display: block; border: 1px solid var(--line); border-radius: 10px; }
-.town .road { fill: none; stroke: var(--road); stroke-width: 3; stroke-linecap: round; }
-.town .way { fill: none; stroke-width: 1.3; } .town .lost { stroke-dasharray: 3 3; }
-.words td { white-space: normal; text-align: left; } .words th { text-align: left; }
+.roads-map { width: 100%; height: auto; max-height: 75vh; display: block; border: 1px solid var(--line); border-radius: 10px; }
+.roads-map .road { fill: none; stroke: var(--road); stroke-width: 3; stroke-linecap: round; }
+.roads-map .way { fill: none; stroke-width: 1.3; } .roads-map .lost { stroke-dasharray: 3 3; }
+.words { margin-top: 0.8rem; }
+.words td { white-space: normal; text-align: left; min-width: 5rem; } .words th { text-align: left; }
 """
 
 
 def write_page(results: Results, tasks: Sequence[MissionTask], out: Path) -> None:
     """Write the page from the results and the missions' traces."""
-    style = files("hippodrome.eval.report").joinpath("style.css").read_text(encoding="utf-8") + STYLE
-    head = element(
-        "head",
-        element("meta", charset="utf-8"),
-        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("title", "Missions"),
-        element("style", Html(style)),
-    )
     parts = [_town(result, [task for task in tasks if task.scenario.name == result.name]) for result in results.scenarios]
-    body = element("body", element("header", element("h1", "Missions")), _figures(results), *parts)
-    write_atomically(out / PAGE, f"<!doctype html>\n{element('html', head, body, lang='en')}\n".encode())
+    body = [element("header", element("h1", "Missions")), element("main", _figures(results), *parts)]
+    write_atomically(out / PAGE, page("Missions", body, TABLE_SCRIPTS, style=STYLE).encode())
 
 
 def _figures(results: Results) -> Html:
-    heads = [element("th", text) for text in ("town", "row", *(heading for heading, *_ in COLUMNS))]
-    rows = [
-        element(
-            "tr", element("td", result.name), element("td", row.method), *(element("td", text) for text in cells(_drive(row)))
-        )
-        for result in results.scenarios
-        for row in result.rows
-    ]
-    return element("table", element("thead", element("tr", *heads)), element("tbody", *rows))
+    heads = ["town", "row", *(heading for heading, *_ in COLUMNS)]
+    rows = [[result.name, row.method, *cells(_drive(row))] for result in results.scenarios for row in result.rows]
+    return joined(plain_table(heads, rows, "missions of all towns"), _meanings(results))
+
+
+def _meanings(results: Results) -> Html:
+    """What the heads of the first table mean, in the words of the results."""
+    words: dict[str, str] = next((_drive(row).get("definitions", {}) for result in results.scenarios for row in result.rows), {})
+    lines = [element("li", f"{heading} ({key}): {words[key]}") for heading, key, *_ in COLUMNS if key in words]
+    return element("details", element("summary", "What each figure means"), element("ul", lines, class_="definitions"))
 
 
 def _town(result: ScenarioResult, tasks: Sequence[MissionTask]) -> Html:
@@ -70,27 +65,25 @@ def _town(result: ScenarioResult, tasks: Sequence[MissionTask]) -> Html:
     ways = [_way(task, number) for number, task in enumerate(task for task in tasks if task.row.key == first)]
     rows = [_mission(row.method, one) for row in result.rows for one in _drive(row)["missions_detail"]]
     heads = ("row", "mission", "start", "goal", "end", "why", "driven m", "time s", "events")
-    table = element(
-        "table",
-        element("thead", element("tr", *(element("th", text) for text in heads))),
-        element("tbody", *rows),
-        class_="words",
+    table = element("div", plain_table(heads, rows, f"{result.name}: missions"), class_="words")
+    picture = _map(network, ways, f"{result.name}: roads and driven ways")
+    return element(
+        "section", element("h2", result.name), element("p", LEGEND, class_="note"), picture, table, data_town=result.name
     )
-    return element("section", element("h2", result.name), element("p", LEGEND), _map(network, ways), table)
 
 
-def _mission(method: str, one: dict[str, Any]) -> Html:
+def _mission(method: str, one: dict[str, Any]) -> list[str]:
     events = ", ".join(f"{count} x {kind}" for kind, count in one["events"].items())
     texts = (method, one["number"], one["start"], one["goal"], one["end"], one["cause"], f"{one['driven_m']:.0f}",
              f"{one['time_s']:.0f}", events)  # fmt: skip
-    return element("tr", *(element("td", str(text)) for text in texts))
+    return [str(text) for text in texts]
 
 
-def _map(network: RoadNetwork, ways: Sequence[Html]) -> Html:
+def _map(network: RoadNetwork, ways: Sequence[Html], label: str) -> Html:
     low, high = network.points_m.min(axis=0) - MARGIN_M, network.points_m.max(axis=0) + MARGIN_M
     roads = [element("path", d=_path(network.lane_points_m(k)), class_="road") for k in range(network.lane_count)]
     box = f"{low[0]:.1f} {-high[1]:.1f} {high[0] - low[0]:.1f} {high[1] - low[1]:.1f}"
-    return element("svg", *roads, *ways, viewBox=box, class_="town", role="img")
+    return element("svg", *roads, *ways, viewBox=box, class_="roads-map", role="img", aria_label=label)
 
 
 def _way(task: MissionTask, number: int) -> Html:

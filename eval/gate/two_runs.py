@@ -9,7 +9,7 @@ from typing import Final
 from rich.console import Console
 from rich.table import Table
 
-from hippodrome.eval.gate.baseline import baseline_of
+from hippodrome.eval.gate.baseline import GateError, baseline_of
 from hippodrome.eval.gate.compare import MOVED, lost_cells, require_comparable
 from hippodrome.eval.report.markup import Child, element
 from hippodrome.eval.report.versus import write_versus
@@ -43,7 +43,11 @@ def differences(before: Results, after: Results) -> list[Difference]:
     Raises GateError if they hold different scenarios, drives or definitions.
     """
     then, now = ({cell.key: cell for cell in baseline_of([one]).cells} for one in (before, after))
-    require_comparable(now, then)
+    try:
+        require_comparable(now, then)
+    except GateError as error:  # whose cures are the gate's: there is no baseline here
+        said = str(error).partition(";")[0].replace("the run", "the second run").replace("the baseline", "the first run")
+        raise GateError(f"{said}; compare runs of the same scenarios and seeds") from None
     return [
         Difference(*key, name, then[key].figures[name].value, figure.value)
         for key, cell in now.items()

@@ -27,7 +27,7 @@ def at_a_glance(results: Results, found: Sequence[ScenarioFiles]) -> Html:
         answers.append(("Second drive", localized))
     answers.append(("Refused or failed", _troubles(results)))
     answers.append(("Run it again", element("code", _command(results.scenarios))))
-    return element("dl", [(element("dt", name), element("dd", words)) for name, words in answers], class_="glance")
+    return element("dl", [joined(element("dt", name), element("dd", words)) for name, words in answers], class_="glance")
 
 
 def best_method(results: Results) -> str | None:

@@ -8,6 +8,8 @@ from typing import TypeAlias
 
 from pydantic import BaseModel
 
+# Characters that turn the direction of what follows, beyond the name that they stand in: shown by their numbers.
+TURNING = {code: f"\\u{code:04x}" for code in (0x061C, 0x200E, 0x200F, *range(0x202A, 0x202F), *range(0x2066, 0x206A))}
 VOID = frozenset({"img", "meta", "input", "br"})  # elements without an end tag
 
 
@@ -52,7 +54,7 @@ def _text(child: Child) -> str:
     if isinstance(child, Html):
         return str(child)
     if isinstance(child, str):
-        return html.escape(child)
+        return html.escape(child.translate(TURNING))
     return "".join(_text(part) for part in child)
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from hippodrome.eval.report.markup import Child, Html, element
+from hippodrome.eval.report.markup import Child, Html, element, joined
 from hippodrome.eval.results.model import Results, Row, ScenarioResult
 from hippodrome.eval.results.tables import (
     LOCALIZATION_COLUMNS,
@@ -20,10 +21,16 @@ from hippodrome.eval.results.tables import (
 )
 
 FIRST: Final = ("APE (m)", "Success", "Error (m)")  # columns beside the method's name, so that a phone shows them unscrolled
+LONG: Final = 36  # letters of a name from which on it is broken
 SPLIT: Final = {  # headings of cells that hold several figures, and those of one column for each figure
     "APE median / p95 / max": ("APE median (m)", "APE p95 (m)", "APE max (m)"),
     "Latency (ms)": ("Latency median (ms)", "Latency p99 (ms)"),
 }
+
+
+def row_head(name: Child) -> Html:
+    """The first cell of a row; a long name may break anywhere, so that it leaves room for the figures."""
+    return element("th", name, scope="row", class_="long" if len(re.sub("<[^>]*>", "", joined(name))) > LONG else None)
 
 
 def scrolling(table: Html, label: str) -> Html:
@@ -33,8 +40,8 @@ def scrolling(table: Html, label: str) -> Html:
 
 def plain_table(heads: Sequence[str], rows: Sequence[Sequence[Child]], label: str) -> Html:
     """A table with the first column to the left and the others to the right; ``label`` names it for screen readers."""
-    head = element("tr", [element("th", title, scope="col") for title in heads])
-    body = [element("tr", element("th", row[0], scope="row"), [element("td", cell) for cell in row[1:]]) for row in rows]
+    head = element("tr", [element("th", title, scope="col") if title else element("td") for title in heads])
+    body = [element("tr", row_head(row[0]), [element("td", cell) for cell in row[1:]]) for row in rows]
     return scrolling(element("table", element("thead", head), element("tbody", body)), label)
 
 
@@ -51,7 +58,7 @@ def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Se
         spans: dict[str, str | int] = {"colspan": len(heads), "scope": "colgroup"} if heads else {"rowspan": 2, "scope": "col"}
         top.append(element("th", title, **spans))
         below += [element("th", head, scope="col") for head in heads]
-    body = [element("tr", element("th", row[0], scope="row"), [element("td", cell) for cell in row[1:]]) for row in rows]
+    body = [element("tr", row_head(row[0]), [element("td", cell) for cell in row[1:]]) for row in rows]
     head = element("thead", element("tr", top, class_="groups"), element("tr", below))
     return scrolling(element("table", head, element("tbody", body)), label)
 
@@ -125,7 +132,7 @@ def _part(column: Column, place: int, row: Row) -> str:
 
 def _row_line(cells: Sequence[str], row: Row) -> Html:
     style = "failed" if row.failure is not None or row.refused is not None else "quoted" if row.quoted else None
-    return element("tr", element("th", cells[0], scope="row"), [element("td", cell) for cell in cells[1:]], class_=style)
+    return element("tr", row_head(cells[0]), [element("td", cell) for cell in cells[1:]], class_=style)
 
 
 def _row(scenario: ScenarioResult, method: str) -> Row | None:

@@ -111,6 +111,11 @@ def page(out):
     return Page(write_report(out).read_text(encoding="utf-8"))
 
 
+def test_a_name_that_turns_the_direction_of_writing_turns_nothing_else():
+    assert element("p", "a\u202ename, and our words") == "<p>a\\u202ename, and our words</p>"
+    assert element("p", "מדינה") == "<p>מדינה</p>", "names in other scripts are left alone"
+
+
 def test_is_one_file_that_asks_the_network_for_nothing(page):
     assert len(page.all("h1")) == 1
     assert all(attributes["src"].startswith("data:") for attributes in page.all("img") if "src" in attributes)

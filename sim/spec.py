@@ -1,4 +1,5 @@
-"""Base of the scenario's models: frozen, unknown keys rejected. Each model is declared beside the code that it configures."""
+"""Base of the scenario's models: frozen, unknown keys rejected. Each model is declared beside the code that it configures, in a
+module that loads none of it: a fault in a scenario is told before a simulator or an algorithm is loaded."""
 
 from __future__ import annotations
 

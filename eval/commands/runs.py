@@ -29,7 +29,7 @@ def add_run_commands(commands: Any) -> None:
         truth.
 
         Writes DIR/results.json (every figure with its definition), DIR/table1.md, DIR/report.html (one page that needs no
-        network) and, for each scenario, a folder with maps (.pbstream), trajectories (TUM) and figures (PNG).
+        network) and, for each scenario, a folder with maps (.pbstream), trajectories (TUM) and figures (PNG, SVG, PDF).
 
         Exits with 1 if a threshold of a scenario does not hold.""",
         ["hippodrome eval scenarios/towns/rural.yaml --out out/rural",

@@ -5,6 +5,7 @@ A removed key has no effect any more: it is left out, and a note says so and why
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Sequence
 from functools import cache, partial
@@ -17,6 +18,7 @@ VALUES: Final[dict[str, dict[str, str]]] = {  # by the key's new name
     "localizer.mode": {"default": "coupled"},
     **{f"{network}.mode": {"default": "bounded"} for network in NETWORKS},
 }
+ENDLESS: Final = ("refine.route.solver.along_sigma_m", "refine.paper.bent_cost")  # scenario.json has null for their infinity
 REMOVED: Final = {  # by the key's present name, why it is gone
     f"refine.route.confidence.{name}": "a route is now held against the mirrored drive, see docs/algorithms.md"
     for name in ("turning_nats", "evidence_growth_nats")
@@ -46,6 +48,8 @@ def with_present_names(scenario: Any) -> Any:
         scenario = _changed(scenario, parents, partial(_renamed, last, present))
     for key in VALUES:
         scenario = _changed(scenario, key.split("."), partial(present_value, key))
+    for key in ENDLESS:
+        scenario = _changed(scenario, key.split("."), _endless)
     for key in REMOVED:
         *parents, last = key.split(".")
         scenario = _changed(scenario, parents, partial(_without, last, key))
@@ -65,6 +69,13 @@ def _renamed(old: str, new: str, data: Any) -> Any:
     if not isinstance(data, dict) or new in data:
         return data
     return {new if name == old else name: value for name, value in data.items()}
+
+
+def _endless(value: Any) -> Any:
+    """A number, or numbers, of which JSON had null where there was infinity."""
+    if isinstance(value, list | tuple):
+        return [_endless(one) for one in value]
+    return math.inf if value is None else value
 
 
 def _without(name: str, key: str, data: Any) -> Any:

@@ -1,12 +1,15 @@
 """Scenarios are found by the name that they have in the package, from any folder."""
 
+import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.cli import main
-from hippodrome.eval.files.scenarios import read_scenario
+from hippodrome.eval.files.scenarios import effective_configuration, read_scenario
 from hippodrome.eval.files.shipped import names, shipped
 
 
@@ -37,3 +40,16 @@ def test_the_list_names_all_and_each_can_be_read(capsys):
     assert {"paper", "towns/rural", "library/village", "gate/blocks"} <= set(found)
     assert all(name in printed for name in found)
     assert read_scenario(Path("towns/grid")).name == "grid"
+
+
+@pytest.mark.parametrize("name", ["towns/rural", "paper"])
+def test_the_scenario_that_a_run_keeps_is_the_scenario(name, tmp_path):
+    """``scenario.json`` lies beside the results, and the report's commands run it again; JSON has no infinity."""
+    scenario = read_scenario(Path(name))
+    kept = tmp_path / "scenario.json"
+    kept.write_text(json.dumps(effective_configuration(scenario)))
+    assert read_scenario(kept) == scenario
+    endless = scenario.refine.paper.__class__(bent_cost=math.inf)
+    other = scenario.model_copy(update={"refine": replace(scenario.refine, paper=endless)})
+    kept.write_text(json.dumps(effective_configuration(other)))
+    assert read_scenario(kept) == other

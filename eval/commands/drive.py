@@ -31,7 +31,8 @@ def add_mission_command(commands: Any) -> None:
         Writes DIR/results.json, with the figures below `drive` of each row, and DIR/drive.html, one page with the driven ways.
         Finished missions are kept: the same command goes on where it was.
 
-        Exits with 1 if there was a collision at fault, wrong-way driving or a false arrival.""",
+        Exits with 1 if there was a collision at fault, wrong-way driving or a false arrival, or if a limit of the scenario
+        (thresholds.drive) does not hold.""",
         ["hippodrome drive scenarios/missions/grid.yaml --missions 3",
          "hippodrome drive scenarios/missions/grid.yaml scenarios/missions/rural.yaml --rows ours truth --workers 2",
          "hippodrome drive scenarios/missions/radial.yaml --missions 1 --film"],
@@ -40,15 +41,14 @@ def add_mission_command(commands: Any) -> None:
     parser.add_argument(
         "--missions",
         type=positive,
-        default=10,
         metavar="N",
-        help="missions in each town; the first are the same for every N (default: 10)",
+        help="missions in each town; the first are the same for every N (default: the scenario's missions.count, or 10)",
     )
     parser.add_argument(
-        "--rows", nargs="+", choices=ROW_KEYS, default=["ours", "truth"], metavar="ROW",
+        "--rows", nargs="+", choices=ROW_KEYS, metavar="ROW",
         help="who drives. ours: from an unknown start; truth: the same, told its true pose (the upper bound); dead-reckoning: "
              "told the true start, and nothing later (the lower bound); no-reading: without the lane read from the frames; "
-             "paper, kalman: with these modes of the localizer (default: ours truth)",
+             "paper, kalman: with these modes of the localizer (default: the scenario's missions.rows, or ours truth)",
     )  # fmt: skip
     parser.add_argument(
         "--film", action="store_true",

@@ -14,14 +14,14 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.drive.flight import TRACE
 from hippodrome.eval.drive.table import COLUMNS, cells
+from hippodrome.eval.report.drives import DRIVE_PAGE
 from hippodrome.eval.report.markup import Html, element
-from hippodrome.eval.results.model import Results, ScenarioResult
+from hippodrome.eval.results.model import Results, Row, ScenarioResult, drive_of
 from hippodrome.sim.record import RecordingPlan
 
 if TYPE_CHECKING:
-    from hippodrome.eval.drive.run import MissionTask
+    from hippodrome.eval.drive.task import MissionTask
 
-PAGE: Final = "drive.html"
 COLOURS: Final = ("#1769aa", "#b3432b", "#2e7d4f", "#7a4fa3", "#a8741a", "#0f7c80")  # of missions, in turn
 EVERY: Final = 5  # a point of the trace in half a second
 MARGIN_M: Final = 15.0
@@ -49,7 +49,7 @@ def write_page(results: Results, tasks: Sequence[MissionTask], out: Path) -> Non
     )
     parts = [_town(result, [task for task in tasks if task.scenario.name == result.name]) for result in results.scenarios]
     body = element("body", element("header", element("h1", "Missions")), _figures(results), *parts)
-    write_atomically(out / PAGE, f"<!doctype html>\n{element('html', head, body, lang='en')}\n".encode())
+    write_atomically(out / DRIVE_PAGE, f"<!doctype html>\n{element('html', head, body, lang='en')}\n".encode())
 
 
 def _figures(results: Results) -> Html:
@@ -114,6 +114,5 @@ def _path(points_m: FloatArray) -> str:
     return "M" + " L".join(f"{x:.1f},{-y:.1f}" for x, y in points_m)
 
 
-def _drive(row: Any) -> dict[str, Any]:
-    figures: dict[str, Any] = row.drive
-    return figures
+def _drive(row: Row) -> dict[str, Any]:
+    return drive_of(row) or {}

@@ -38,7 +38,6 @@ ROWS: Final = (
     RowSpec("paper", "ours, localizer mode paper", mode="paper"),
     RowSpec("kalman", "ours, localizer mode kalman", mode="kalman"),
 )
-DEFAULT_ROWS: Final = ("ours", "truth")
 
 
 def row_named(key: str) -> RowSpec:

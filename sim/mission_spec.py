@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from hippodrome.sim.spec import Spec
 
 RowKey = Literal["ours", "truth", "dead-reckoning", "no-reading", "paper", "kalman"]
+POLICY = r"(exec|stream):.*\S.*|[\w.]+:[\w.]+"  # a command that is fed step by step, or a Python object
+PolicyName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$")]
+Source = Annotated[str, Field(pattern=f"^({POLICY})$")]
 Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 MOST_MISSIONS = 1000  # a night of driving; more is a slip of the keyboard
@@ -18,7 +21,15 @@ class MissionSpec(Spec):
     """Missions that belong to a scenario: where there are some, ``hippodrome gate`` and ``sweep`` drive instead of evaluating."""
 
     count: Annotated[int, Field(ge=1, le=MOST_MISSIONS)] | None = None  # how many, the first the same for every count; null: none
-    rows: Annotated[tuple[RowKey, ...], Field(min_length=1)] = ("ours", "truth")  # who drives
+    rows: tuple[RowKey, ...] = ("ours", "truth")  # who drives
+    policies: dict[PolicyName, Source] = Field(default_factory=dict)  # of others that drive, too: module:Object or stream:COMMAND
+    answer_limit_s: Annotated[float, Field(gt=0, le=3600)] = 30.0  # for each step of such a policy
+
+    @model_validator(mode="after")
+    def _somebody_drives(self) -> MissionSpec:
+        if not self.rows and not self.policies:
+            raise ValueError("nobody drives: name rows or policies")
+        return self
 
 
 class MissionLimits(Spec):

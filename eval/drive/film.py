@@ -11,8 +11,8 @@ import numpy as np
 from PIL import Image
 
 from hippodrome._files import replacing
-from hippodrome.core.navigation.navigator import Navigator
 from hippodrome.core.types import FloatArray, Frame
+from hippodrome.eval.drive.drivers import Driver
 from hippodrome.eval.drive.missions import Mission, pose_of
 from hippodrome.sim.loop.types import Sensed
 from hippodrome.sim.loop.world import World
@@ -40,13 +40,13 @@ class Film:
         self._camera: Frame = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         self._steps = 0
 
-    def look(self, sensed: Sensed, navigator: Navigator) -> None:
+    def look(self, sensed: Sensed, driver: Driver) -> None:
         """Take a step in; every few of them make a picture."""
         if sensed.observation.frame is not None:
             shown = cv2.resize(_coloured(sensed.observation.frame), SIZE, interpolation=cv2.INTER_NEAREST)
             self._camera = np.asarray(shown, dtype=np.uint8)
         if self._steps % EVERY_STEPS == 0 and len(self._pictures) < MOST:
-            self._pictures.append(Image.fromarray(np.hstack([self._camera, self._from_above(sensed, navigator)])))
+            self._pictures.append(Image.fromarray(np.hstack([self._camera, self._from_above(sensed, driver)])))
         self._steps += 1
 
     def write(self, file: Path) -> None:
@@ -55,7 +55,7 @@ class Film:
             first, *others = self._pictures
             first.save(stream, "WEBP", save_all=True, append_images=others, duration=SHOWN_MS, loop=0, quality=QUALITY)
 
-    def _from_above(self, sensed: Sensed, navigator: Navigator) -> Frame:
+    def _from_above(self, sensed: Sensed, driver: Driver) -> Frame:
         truth = sensed.truth
         middle = np.array([truth.x_m, truth.y_m])
         picture = np.full((SIZE[1], SIZE[0], 3), 245, dtype=np.uint8)
@@ -67,17 +67,15 @@ class Film:
 
         for lane in self._lanes:
             cv2.polylines(picture, [drawn(lane)], False, ROAD, 6, cv2.LINE_AA)
-        if navigator.plan is not None:
-            cv2.polylines(picture, [drawn(navigator.plan.course.path.points_m)], False, PLAN, 2, cv2.LINE_AA)
+        if driver.plan is not None:
+            cv2.polylines(picture, [drawn(driver.plan.course.path.points_m)], False, PLAN, 2, cv2.LINE_AA)
         goal = drawn(self._goal_m)[0, 0]
         cv2.circle(picture, (int(goal[0]), int(goal[1])), 5, GOAL, -1, cv2.LINE_AA)
         for pose in sensed.traffic:
             _box(picture, drawn, np.asarray(pose[:3], dtype=np.float64), OTHER, (-2.2, 2.2))
         _box(picture, drawn, np.array(truth.pose_m), EGO, (-0.9, 3.6))
-        if navigator.track is not None:
-            cv2.polylines(
-                picture, [drawn(_ellipse_m(navigator.track.pose, navigator.track.covariance))], True, BELIEF, 2, cv2.LINE_AA
-            )
+        if driver.track is not None:
+            cv2.polylines(picture, [drawn(_ellipse_m(driver.track.pose, driver.track.covariance))], True, BELIEF, 2, cv2.LINE_AA)
         state = f"{truth.t_s:5.1f} s  {3.6 * truth.speed_mps:3.0f} km/h"
         cv2.putText(picture, state, (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (20, 20, 20), 1, cv2.LINE_AA)
         return picture

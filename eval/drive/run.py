@@ -9,17 +9,29 @@ from pathlib import Path
 from typing import Any, Final
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.drive.foreign import GIVEN, Policy, check_policy
 from hippodrome.eval.drive.maps import MapTask, make_map
 from hippodrome.eval.drive.page import write_page
-from hippodrome.eval.drive.rows import RowSpec, row_named
+from hippodrome.eval.drive.rows import RowSpec, policy_row, row_named
 from hippodrome.eval.drive.scoring import row_result
 from hippodrome.eval.drive.table import print_table
 from hippodrome.eval.drive.task import MissionTask, missions_of, run_mission
 from hippodrome.eval.files.scenarios import effective_configuration
 from hippodrome.eval.pool import worker_pool
+from hippodrome.eval.programs.process import can_conceal
 from hippodrome.eval.report.drives import DRIVE_PAGE
 from hippodrome.eval.report.report import REPORT, write_report
-from hippodrome.eval.results.model import DECIMALS, Network, Results, Row, ScenarioResult, drive_of, read_results, write_results
+from hippodrome.eval.results.model import (
+    DECIMALS,
+    Declaration,
+    Network,
+    Results,
+    Row,
+    ScenarioResult,
+    drive_of,
+    read_results,
+    write_results,
+)
 from hippodrome.eval.results.thresholds import failed_mission_limits
 from hippodrome.eval.run import RESULTS, load_scenarios, make_recordings
 from hippodrome.sim.record import RecordingPlan
@@ -41,6 +53,7 @@ class DriveRequest:
     workers: int
     out: Path
     film: bool = False
+    policies: Sequence[Policy] = ()  # that drive beside the rows
 
 
 def drive(request: DriveRequest) -> bool:
@@ -73,9 +86,18 @@ def drive(request: DriveRequest) -> bool:
 
 def asked(scenario: Scenario, request: DriveRequest) -> Scenario:
     """The scenario with the missions that the command asks for."""
-    missions = scenario.missions
+    missions, names = scenario.missions, [one.name for one in request.policies]
+    for name in names:
+        if names.count(name) > 1 or name in missions.policies:
+            raise HippodromeError(f"--policy {name}: there is another one of this name; give it its own, NAME=POLICY")
+    if request.rows == [] and not (names or missions.policies):
+        raise HippodromeError("--rows: nobody drives; name a row, or a --policy")
     changed = missions.model_copy(
-        update={"count": request.missions or missions.count or MISSIONS, "rows": tuple(request.rows or missions.rows)}
+        update={
+            "count": request.missions or missions.count or MISSIONS,
+            "rows": missions.rows if request.rows is None else tuple(request.rows),
+            "policies": {**missions.policies, **{one.name: one.source for one in request.policies}},
+        }
     )
     return scenario.model_copy(update={"missions": changed})
 
@@ -84,6 +106,8 @@ def drive_scenarios(
     scenarios: Sequence[Scenario], workers: int, out: Path, film: bool = False
 ) -> tuple[Results, list[MissionTask]]:
     """Record, map and drive the missions of scenarios; files go below ``out``. Raises HippodromeError."""
+    for policy in dict.fromkeys(row.policy for scenario in scenarios for row in rows_of(scenario) if row.policy is not None):
+        check_policy(policy)  # what cannot be loaded is said before anything is simulated
     require_gl()
     with worker_pool(workers) as pool:
         make_recordings([RecordingPlan(scenario, "mapping", out) for scenario in scenarios], pool)
@@ -109,7 +133,8 @@ def tasks_of(scenario: Scenario, map_file: Path, out: Path, film: bool = False) 
 
 def rows_of(scenario: Scenario) -> list[RowSpec]:
     """Who drives a scenario's missions. Raises HippodromeError."""
-    return [row_named(key) for key in dict.fromkeys(scenario.missions.rows)]
+    ours = [row_named(key) for key in dict.fromkeys(scenario.missions.rows)]
+    return [*ours, *(policy_row(Policy(name, source)) for name, source in scenario.missions.policies.items())]
 
 
 def with_earlier(results: Results, file: Path) -> Results:
@@ -139,7 +164,7 @@ def scenario_result(
         simulated_s, cpu_s = sum(one["figures"]["time_s"] for one in own), sum(one["cpu_s"] for one in own)
         factor = round(simulated_s / cpu_s, DECIMALS) if cpu_s > 0.0 else None
         drive = {"row": row.key, **row_result([one["figures"] for one in own], factor)}
-        made.append(Row(method=row.label, drive=drive))
+        made.append(Row(method=row.label, failure=_failure(own), declaration=_declaration(row), drive=drive))
     town = RecordingPlan(scenario, "mapping", out).town()
     edges = len(town.network.edge_ids)
     lengths = town.network.lane_lengths_m()[~town.network.is_internal]
@@ -156,6 +181,19 @@ def scenario_result(
         rows=tuple(made),
         configuration=effective_configuration(scenario),
     )
+
+
+def _failure(figures: Sequence[dict[str, Any]]) -> str | None:
+    """How many missions of a policy failed by its own fault, and how the first of them; None if none did."""
+    causes = [cause for one in figures if (cause := one["figures"].get("failure"))]
+    return f"{len(causes)} of {len(figures)} missions: {causes[0]}" if causes else None
+
+
+def _declaration(row: RowSpec) -> Declaration | None:
+    """What a policy was given, and whether the truth was within its reach; none for a row of ours."""
+    if row.policy is None:
+        return None
+    return Declaration(frame="network", given=GIVEN, source=row.policy.source, isolated=can_conceal())
 
 
 def _is_serious(drive: dict[str, Any]) -> bool:

@@ -15,10 +15,12 @@ import numpy as np
 from hippodrome._files import PACKAGE, code_sha256, read_bounded, replacing, write_atomically
 from hippodrome.core.navigation.config import PlanConfig
 from hippodrome.core.navigation.routes import mapped_lanes
+from hippodrome.core.navigation.types import Goal
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.drive.drivers import Cockpit
 from hippodrome.eval.drive.flight import TRACE, Flight, fly
 from hippodrome.eval.drive.maps import read_map, surveyed
-from hippodrome.eval.drive.missions import Mission, draw_missions
+from hippodrome.eval.drive.missions import Mission, draw_missions, pose_of
 from hippodrome.eval.drive.reference import reference_time_s
 from hippodrome.eval.drive.rows import RowSpec
 from hippodrome.eval.drive.scoring import mission_result
@@ -46,13 +48,13 @@ class MissionTask:
 
     def file(self) -> Path:
         """Where its figures are, or will be; the name holds all that they depend on."""
-        what = json.dumps(
-            [self.scenario.model_dump(mode="json", exclude={"description", "thresholds", "methods", "missions"}), self.row.key,
-             self.mission.as_json(), self.map_file.name, figure_code_sha256(*DRIVE_CODE), code_sha256(PACKAGE, DRIVE_CODE)],
-            sort_keys=True, default=str,
-        )  # fmt: skip
+        left_out = {"description", "thresholds", "methods", "missions"}  # nobody drives otherwise for them
+        scenario = self.scenario.model_dump(mode="json", exclude=left_out)
+        code = figure_code_sha256(*DRIVE_CODE), code_sha256(PACKAGE, DRIVE_CODE)
+        who = self.row.key, *self.row.made_of()
+        what = json.dumps([scenario, who, self.mission.as_json(), self.map_file.name, code], sort_keys=True, default=str)
         key = hashlib.sha256(what.encode()).hexdigest()[:12]
-        return self.out / self.scenario.name / "missions" / f"{self.row.key}-{self.mission.number:03d}-{key}.json"
+        return self.out / self.scenario.name / "missions" / f"{self.row.stem}-{self.mission.number:03d}-{key}.json"
 
     def trace_file(self) -> Path:
         """Where what happened is written, step by step."""
@@ -88,22 +90,28 @@ def run_mission(task: MissionTask) -> dict[str, Any]:
     finally:
         world.close()
     figures = mission_result(task.mission, flight, world.network, reference_s)
+    if flight.failure:
+        figures["failure"] = flight.failure
     with replacing(task.trace_file()) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, columns=np.array(TRACE), trace=flight.trace.astype(np.float32))
     timed = {"figures": json.loads(to_json(figures)), "cpu_s": round(flight.cpu_s, 3)}
-    write_atomically(file, to_json(timed, str(file)).encode())
+    if not flight.failure:  # one that failed is driven anew by the next command
+        write_atomically(file, to_json(timed, str(file)).encode())
     print(_line(task, figures), file=sys.stderr, flush=True)
     return timed
 
 
 def _flight(task: MissionTask, world: World) -> Flight:
-    arguments = world, task.mission, task.row, read_map(task.map_file), surveyed(task.scenario, task.out)
+    roads = surveyed(task.scenario, task.out)
+    goal = Goal(*pose_of(roads, task.mission.goal_lane, task.mission.goal_m))
+    hidden = tuple(task.out / name for name in ("recordings", "towns", task.scenario.name))
+    cockpit = Cockpit(task.scenario, task.row, task.map_file, roads, goal, task.mission.number, hidden)
     if not task.film:
-        return fly(*arguments)
+        return fly(world, task.mission, cockpit)
     from hippodrome.eval.drive.film import Film
 
     film = Film(world, task.mission)
-    flight = fly(*arguments, look=film.look)
+    flight = fly(world, task.mission, cockpit, film.look)
     film.write(task.film_file())
     return flight
 

@@ -59,8 +59,10 @@ def add_mission_command(commands: Any) -> None:
              "sensed, map, road network and goal; docs/loop.md shows each (default: the scenario's missions.policies)",
     )  # fmt: skip
     parser.add_argument(
-        "--film", action="store_true",
-        help="write an animated WebP of each mission too: the camera, and from above the roads, the plan and the belief",
+        "--film", nargs="?", choices=("webp", "mp4"), const="webp", default="", metavar="webp|mp4",
+        help="write a film of each mission too, an animated WebP or an MP4: the camera, the town from above with plan and "
+             "belief, what the driver says, the ring of head-direction cells and the sheets of grid cells (without a word: webp; "
+             "default: no film)",
     )  # fmt: skip
     add_workers(parser)
     add_out(parser, "out/drive")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import process_time
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -54,7 +54,10 @@ def limit_s(mission: Mission) -> float:
     return min(LONGEST_S, SEARCH_S + mission.shortest_m / SLOWEST_MPS)
 
 
-def fly(world: World, mission: Mission, cockpit: Cockpit, look: Callable[[Sensed, Driver], None] | None = None) -> Flight:
+Look: TypeAlias = Callable[[Sensed, Driver, Command], None]
+
+
+def fly(world: World, mission: Mission, cockpit: Cockpit, look: Look | None = None) -> Flight:
     """Drive one mission. ``look`` is shown each step, for films. A policy that fails ends the mission, and is told of.
 
     Raises:
@@ -73,7 +76,7 @@ def fly(world: World, mission: Mission, cockpit: Cockpit, look: Callable[[Sensed
                     known.truth = sensed.truth
                 command = driver.step(sensed.observation, sensed.radar)
                 if look is not None:
-                    look(sensed, driver)
+                    look(sensed, driver, command)
                 rows.append(_written(sensed, driver, command.state))
                 events += sensed.events
                 standing_s = standing_s + STEP_S if sensed.truth.speed_mps < STANDING_MPS else 0.0

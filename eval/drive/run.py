@@ -52,7 +52,7 @@ class DriveRequest:
     rows: Sequence[str] | None  # None: those that the scenario says
     workers: int
     out: Path
-    film: bool = False
+    film: str = ""  # webp or mp4: one of each mission
     policies: Sequence[Policy] = ()  # that drive beside the rows
 
 
@@ -102,9 +102,7 @@ def asked(scenario: Scenario, request: DriveRequest) -> Scenario:
     return scenario.model_copy(update={"missions": changed})
 
 
-def drive_scenarios(
-    scenarios: Sequence[Scenario], workers: int, out: Path, film: bool = False
-) -> tuple[Results, list[MissionTask]]:
+def drive_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path, film: str = "") -> tuple[Results, list[MissionTask]]:
     """Record, map and drive the missions of scenarios; files go below ``out``. Raises HippodromeError."""
     for policy in dict.fromkeys(row.policy for scenario in scenarios for row in rows_of(scenario) if row.policy is not None):
         check_policy(policy)  # what cannot be loaded is said before anything is simulated
@@ -124,7 +122,7 @@ def drive_here(scenario: Scenario, out: Path) -> ScenarioResult:
     return scenario_result(scenario, tasks, [run_mission(task) for task in tasks], out)
 
 
-def tasks_of(scenario: Scenario, map_file: Path, out: Path, film: bool = False) -> list[MissionTask]:
+def tasks_of(scenario: Scenario, map_file: Path, out: Path, film: str = "") -> list[MissionTask]:
     """The missions of a scenario that says how many, for each of its rows."""
     assert scenario.missions.count is not None
     missions = missions_of(scenario, map_file, out, scenario.missions.count)

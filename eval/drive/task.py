@@ -44,7 +44,7 @@ class MissionTask:
     mission: Mission
     map_file: Path
     out: Path
-    film: bool
+    film: str  # webp or mp4; empty: none
 
     def file(self) -> Path:
         """Where its figures are, or will be; the name holds all that they depend on."""
@@ -62,7 +62,7 @@ class MissionTask:
 
     def film_file(self) -> Path:
         """Where its film is, if one was asked for."""
-        return self.file().with_suffix(".webp")
+        return self.file().with_suffix(f".{self.film}")
 
 
 def missions_of(scenario: Scenario, map_file: Path, out: Path, count: int) -> list[Mission]:

@@ -47,11 +47,11 @@ def mission_table(scenario: ScenarioResult) -> Html | None:
 def mission_overview(results: Results) -> Html | None:
     """All rows of all towns that drove; None if nobody did."""
     rows = [
-        [scenario.name, name, str(drive["missions"]), *drive_cells(drive)]
+        [scenario.name, name, str(drive["missions"]), *drive_cells(drive), per_km(drive)]
         for scenario in results.scenarios
         for name, drive in missions_of(scenario)
     ]
-    heads = ["Scenario", "Row", "Missions", *(column.title for column in DRIVE_COLUMNS)]
+    heads = ["Scenario", "Row", "Missions", *(column.title for column in DRIVE_COLUMNS), "events per km"]
     return plain_table(heads, rows, "missions of all scenarios") if rows else None
 
 

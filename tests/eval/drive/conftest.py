@@ -19,10 +19,11 @@ from hippodrome.sim.loop.world import World
 from hippodrome.sim.record import RecordingPlan
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario, load_scenario
+from tests.eval.report.conftest import browser  # noqa: F401  # of the pages
 
 TOWN = """
 name: hamlet
-seed: 4
+seed: 5
 town: {kind: grid, width_m: 130, height_m: 130, road_km: 0.8}
 camera: {rate_hz: 5}
 noise: paper

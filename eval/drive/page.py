@@ -36,9 +36,9 @@ STYLE: Final = """
 .town .way { fill: none; stroke-width: 1.3; } .town .lost { stroke-dasharray: 3 3; }
 .town .one { opacity: .45; } .town .chosen { opacity: 1; }
 .town .car { fill: var(--ink); } .town .belief { fill: none; stroke: var(--ink); stroke-width: 1; }
-.words td { white-space: normal; text-align: left; min-width: 6em; }
-.player { display: flex; flex-wrap: wrap; gap: .5rem 1rem; align-items: center; margin: .5rem 0; }
-.player input { flex: 1 1 12rem; min-width: 0; } .player select { max-width: 100%; }
+.words td { white-space: normal; min-width: 6em; } .words td, .words thead th { text-align: left; }
+.drive-controls { display: flex; flex-wrap: wrap; gap: .5rem 1rem; align-items: center; margin: .5rem 0; }
+.drive-controls input { flex: 1 1 12rem; min-width: 0; } .drive-controls select { max-width: 100%; }
 """
 
 
@@ -104,7 +104,7 @@ def _controls(driven: Sequence[tuple[MissionTask, FloatArray]]) -> Html:
         element("button", "\u25b6 Play", type="button", class_="play"),
         element("input", type="range", min=0, value=0, aria_label="Time of the mission"),
         element("output", ""),
-        class_="player",
+        class_="drive-controls",
     )
 
 

@@ -55,7 +55,7 @@ for (const section of document.querySelectorAll("section.drives")) {
   slider.addEventListener("input", () => { stop(); now = slider.value * mission.every_s; show(); });
   choice.addEventListener("change", () => choose(Number(choice.value)));
   for (const one of section.querySelectorAll("button.show")) {
-    one.addEventListener("click", () => { choose(Number(one.dataset.mission)); find(".player").scrollIntoView({ block: "start" }); button.click(); });
+    one.addEventListener("click", () => { choose(Number(one.dataset.mission)); find(".drive-controls").scrollIntoView({ block: "start" }); button.click(); });
   }
   choose(0);
 }

@@ -45,12 +45,13 @@ def test_figures_causes_and_definitions_are_in_the_page(page):
 @pytest.mark.parametrize(("width", "dark"), [(1400, False), (360, True)])
 def test_a_mission_plays_and_the_page_is_readable(browser, page, width, dark):
     tab = browser.open(page.as_uri(), width=width, dark=dark)
-    said = "document.querySelector('.player output').textContent"
+    tab.run("window.of = (name) => document.querySelector('.drive-controls ' + name); 0")
+    said = "of('output').textContent"
     assert tab.run(said) == "0 s, 18 km/h, driving"
     shown = "[...document.querySelectorAll('.ways')].map((one) => one.style.display)"
     assert tab.run(shown) == ["", "none"]
     tab.run("document.querySelectorAll('button.show')[1].click()")
-    assert tab.run(shown) == ["none", ""] and tab.run("document.querySelector('.player button').textContent").endswith("Pause")
-    tab.run("(() => { const s = document.querySelector('.player input'); s.value = 12; s.dispatchEvent(new Event('input')); })()")
+    assert tab.run(shown) == ["none", ""] and tab.run("of('button').textContent").endswith("Pause")
+    tab.run("of('input').value = 12; of('input').dispatchEvent(new Event('input')); 0")
     assert tab.run(said).startswith("6 s") and tab.run("document.querySelector('.belief').style.display") == ""
     look_at(tab)

@@ -2,11 +2,12 @@
 
 import pytest
 
+from hippodrome.eval.gate import run as gate_run
 from hippodrome.eval.gate.baseline import MISSIONS, baseline_of, question_of
 from hippodrome.eval.gate.compare import compare
 from hippodrome.eval.gate.report import junit_xml, outcome_of, summary_markdown
 from hippodrome.eval.gate.run import broken_limits
-from hippodrome.eval.results.model import Network, Results, Row, ScenarioResult
+from hippodrome.eval.results.model import Network, Results, Row, ScenarioResult, read_results
 from hippodrome.eval.results.thresholds import failed_limits
 from hippodrome.sim.mission_spec import MissionLimits
 from hippodrome.sim.scenario import Scenario, Thresholds
@@ -80,3 +81,29 @@ def test_limits_speak_of_a_row_by_key_or_name():
 
 def test_a_scenario_without_missions_has_none():
     assert Scenario(name="town").missions.count is None
+
+
+def test_scenarios_with_missions_are_driven_and_the_others_evaluated(tmp_path, monkeypatch):
+    for name, missions in (("driven", "missions: {count: 2, rows: [truth]}\n"), ("mapped", "")):
+        (tmp_path / f"{name}.yaml").write_text(f"name: {name}\n{missions}")
+    asked = {}
+
+    def drives(scenarios, workers, out):
+        asked["driven"] = [one.name for one in scenarios]
+        return run()[0], []
+
+    def evaluates(scenarios, workers, out):
+        asked["mapped"] = [one.name for one in scenarios]
+        return Results(scenarios=())
+
+    monkeypatch.setattr(gate_run, "drive_scenarios", drives)
+    monkeypatch.setattr(gate_run, "run_scenarios", evaluates)
+    monkeypatch.setattr(gate_run, "write_page", lambda *_: None)
+    paths, baseline = [tmp_path / "driven.yaml", tmp_path / "mapped.yaml"], tmp_path / "baseline.json"
+    request = gate_run.GateRequest(paths, (1, 2), baseline, True, 1, tmp_path / "out", None)
+    (tmp_path / "out/seed-1").mkdir(parents=True)
+    (tmp_path / "out/seed-2").mkdir()
+    assert gate_run.gate(request) == "passed"
+    assert asked == {"driven": ["driven"], "mapped": ["mapped"]}
+    assert "collisions at fault (times)" in baseline.read_text()
+    assert len(read_results(tmp_path / "out/seed-2/results.json").scenarios) == 3

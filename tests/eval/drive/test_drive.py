@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from hippodrome.eval.drive.foreign import Policy
-from hippodrome.eval.drive.run import drive
+from hippodrome.eval.drive.run import asked, drive, drive_here
+from hippodrome.eval.drive.table import print_table
 from hippodrome.eval.gate.baseline import baseline_of
-from hippodrome.eval.results.model import read_results, to_json, without_timings
+from hippodrome.eval.results.model import Results, read_results, to_json, without_timings
 
 FALLS = """
 class Falls:
@@ -85,8 +86,9 @@ def test_a_policy_that_falls_has_a_row_with_its_cause(hamlet, tmp_path, monkeypa
     (tmp_path / "falling.py").write_text(FALLS)
     monkeypatch.chdir(tmp_path)
     request = hamlet.request(tmp_path / "out", rows=[], policies=[Policy("mine", "falling:Falls")])
-    drive(request)
-    (row,) = read_results(request.out / "results.json").scenarios[0].rows
+    result = drive_here(asked(hamlet.scenario, request), request.out)  # as a cell of a sweep does, in this process
+    print_table(Results(scenarios=(result,)))
+    (row,) = result.rows
     assert row.method == "mine" and "ValueError: at the first step" in row.failure and row.failure.startswith("1 of 1 missions")
     assert row.declaration.source == "falling:Falls" and row.drive["success_rate"] == 0.0
     assert "the policy failed" in row.drive["missions_detail"][0]["cause"] and "ValueError" in capsys.readouterr().out

@@ -20,7 +20,7 @@ FIGURE_CODE: Final = (  # all code that a figure in the tables comes from, as pa
 )
 # Keys of a scenario that no drive and no recording depends on: they say how the algorithms answer, what limits their answers must
 # keep, and what people should know. Two scenarios that differ only in these pose the same question and share their recordings.
-DRIVE_INDEPENDENT_KEYS: Final = ("mapper", "refine", "localizer", "methods", "thresholds", "description")
+DRIVE_INDEPENDENT_KEYS: Final = ("mapper", "refine", "localizer", "methods", "missions", "thresholds", "description")
 
 
 def figure_code_sha256(*more: str) -> str:

@@ -12,6 +12,7 @@ from hippodrome.core.mapping.config import MapperConfig
 from hippodrome.core.refinement.config import RefineConfig
 from hippodrome.sim.ego_spec import EgoSpec
 from hippodrome.sim.method_spec import MethodSpec
+from hippodrome.sim.mission_spec import MissionLimits, MissionSpec
 from hippodrome.sim.renamed import with_present_names
 from hippodrome.sim.render.camera import CameraSpec, camera_divider
 from hippodrome.sim.scene.conditions_spec import Conditions
@@ -46,7 +47,7 @@ class DriveSpec(Spec):
 
 
 class Thresholds(Spec):
-    """Limits that make ``hippodrome eval`` exit with 1; a limit left out is not checked."""
+    """Limits that make ``hippodrome eval``, ``drive`` and ``gate`` exit with 1; a limit left out is not checked."""
 
     method: str = "topometric (paper)"  # the row that the limits speak of
     ape_mean_m: Annotated[float, Field(gt=0)] | None = None
@@ -54,6 +55,7 @@ class Thresholds(Spec):
     localization_error_mean_m: Annotated[float, Field(gt=0)] | None = None
     localization_success: bool = False  # True: localization must succeed
     false_fixes: Annotated[int, Field(ge=0)] | None = None
+    drive: MissionLimits = MissionLimits()  # of missions
 
 
 class Scenario(Spec):
@@ -72,6 +74,7 @@ class Scenario(Spec):
     refine: RefineConfig = RefineConfig()
     localizer: LocalizerConfig = LocalizerConfig()
     methods: dict[MethodName, MethodSpec] = Field(default_factory=dict)  # that take part beside ours, by name
+    missions: MissionSpec = MissionSpec()
     thresholds: Thresholds = Thresholds()
 
     @model_validator(mode="before")

@@ -40,8 +40,8 @@ CORE_ROOMS = {
 # The rooms of eval from the lowest to the highest: each may import only those before it.
 EVAL_ROOMS = (
     "metrics", "files", "methods", "programs", "results", "pool", "reuse", "figures", "report", "rivals/ratslam",
-    "rivals/orbslam3", "rivals", "contest", "evaluate", "run", "authoring", "gate", "board", "sweep", "trials/stress",
-    "trials/robustness", "trials/rivals", "drive", "exchange/drives", "exchange/readers", "exchange/formats", "exchange", "real",
+    "rivals/orbslam3", "rivals", "contest", "evaluate", "run", "drive", "authoring", "gate", "board", "sweep", "trials/stress",
+    "trials/robustness", "trials/rivals", "exchange/drives", "exchange/readers", "exchange/formats", "exchange", "real",
     "commands", "cli",
 )  # fmt: skip
 CORE_PACKAGES = {"cv2", "numba", "numpy", "scipy"}

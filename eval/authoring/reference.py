@@ -22,7 +22,8 @@ UNITS: Final = {  # units by the ends of fields' names, longer ends first
 }  # fmt: skip
 HEADS: Final = {
     "": "The scenario", "town": "`town`: where to drive", "camera": "`camera`: what is seen",
-    "mapping": "`mapping` and `localization`: the two drives", "thresholds": "`thresholds`: when `hippodrome eval` exits with 1",
+    "mapping": "`mapping` and `localization`: the two drives", "missions": "`missions`: goals to drive to",
+    "thresholds": "`thresholds`: when `hippodrome eval`, `drive` and `gate` exit with 1",
     "mapper": "`mapper`: from frames to a semi-metric map", "refine": "`refine`: from semi-metric to topometric",
     "localizer": "`localizer`: where am I in the map",
 }  # fmt: skip

@@ -31,31 +31,51 @@ def add_mission_command(commands: Any) -> None:
         Writes DIR/results.json, with the figures below `drive` of each row, and DIR/drive.html, one page with the driven ways.
         Finished missions are kept: the same command goes on where it was.
 
-        Exits with 1 if there was a collision at fault, wrong-way driving or a false arrival.""",
+        Exits with 1 if there was a collision at fault, wrong-way driving or a false arrival, or if a limit of the scenario
+        (thresholds.drive) does not hold.""",
         ["hippodrome drive scenarios/missions/grid.yaml --missions 3",
          "hippodrome drive scenarios/missions/grid.yaml scenarios/missions/rural.yaml --rows ours truth --workers 2",
+         "hippodrome drive scenarios/missions/rural.yaml --missions 2 --rows truth --policy my_module:MyPolicy",
          "hippodrome drive scenarios/missions/radial.yaml --missions 1 --film"],
     )  # fmt: skip
     add_scenarios(parser, several=True)
     parser.add_argument(
         "--missions",
         type=positive,
-        default=10,
         metavar="N",
-        help="missions in each town; the first are the same for every N (default: 10)",
+        help="missions in each town; the first are the same for every N (default: the scenario's missions.count, or 10)",
     )
     parser.add_argument(
-        "--rows", nargs="+", choices=ROW_KEYS, default=["ours", "truth"], metavar="ROW",
+        "--rows", nargs="*", choices=ROW_KEYS, metavar="ROW",
         help="who drives. ours: from an unknown start; truth: the same, told its true pose (the upper bound); dead-reckoning: "
              "told the true start, and nothing later (the lower bound); no-reading: without the lane read from the frames; "
-             "paper, kalman: with these modes of the localizer (default: ours truth)",
+             "paper, kalman: with these modes of the localizer (default: the scenario's missions.rows, or ours truth; "
+             "without a ROW: policies alone)",
     )  # fmt: skip
     parser.add_argument(
-        "--film", action="store_true",
-        help="write an animated WebP of each mission too: the camera, and from above the roads, the plan and the belief",
+        "--policy", type=_policy, action="append", default=[], metavar="[NAME=]POLICY",
+        help="somebody else who drives too, also several times: a Python class or function, my_package.my_module:MyPolicy, or a "
+             "program that is fed step by step, 'exec:./driver'. It runs in a process of its own and sees nothing but what is "
+             "sensed, map, road network and goal; docs/loop.md shows each (default: the scenario's missions.policies)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--film", nargs="?", choices=("webp", "mp4"), const="webp", default="", metavar="webp|mp4",
+        help="write a film of each mission too, an animated WebP or an MP4: the camera, the town from above with plan and "
+             "belief, what the driver says, the ring of head-direction cells and the sheets of grid cells (without a word: webp; "
+             "default: no film)",
     )  # fmt: skip
     add_workers(parser)
     add_out(parser, "out/drive")
+
+
+def _policy(text: str) -> Any:
+    """A policy, as ``--policy`` names it."""
+    from hippodrome.eval.drive.foreign import parse_policy  # not before it is needed: --help answers at once
+
+    try:
+        return parse_policy(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _drive(options: argparse.Namespace) -> int:
@@ -63,6 +83,6 @@ def _drive(options: argparse.Namespace) -> int:
 
     request = DriveRequest(
         scenarios=options.scenarios, network=options.network, seed=options.seed, missions=options.missions, rows=options.rows,
-        workers=options.workers, out=options.out, film=options.film,
+        workers=options.workers, out=options.out, film=options.film, policies=options.policy,
     )  # fmt: skip
     return DONE if drive(request) else THRESHOLD_FAILED

@@ -14,10 +14,10 @@ from hippodrome.sim.scenario import Scenario
 
 def methods_sha256(scenario: Scenario) -> list[str]:
     """One hash for each method that the scenario names, none if it names none."""
-    return [_sha256(spec) for spec in scenario.methods.values()]
+    return [method_sha256(spec) for spec in scenario.methods.values()]
 
 
-def _sha256(spec: MethodSpec) -> str:
+def method_sha256(spec: MethodSpec) -> str:
     """Hash of a class's module, or of the files that a command names. What these use in turn is not in it."""
     files = [_module_file(spec.class_)] if spec.class_ is not None else []
     for command in (spec.command, spec.stream, spec.localize):

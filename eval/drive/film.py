@@ -1,9 +1,14 @@
-"""The film of a mission: the camera beside the town from above, with the plan, the belief and the vehicle."""
+"""The film of a mission: the camera beside the town from above, with plan, belief and vehicle.
+
+Below them stand what the driver says, and the localizer's networks.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import Any, Final
 
 import cv2
@@ -11,12 +16,15 @@ import numpy as np
 from PIL import Image
 
 from hippodrome._files import replacing
-from hippodrome.core.navigation.navigator import Navigator
-from hippodrome.core.types import FloatArray, Frame
+from hippodrome.core.navigation.types import Command
+from hippodrome.core.types import FloatArray, Frame, HippodromeError, LocalizationEstimate
+from hippodrome.eval.drive.brain import PAPER, grid_sheet, head_ring
+from hippodrome.eval.drive.drivers import Driver
 from hippodrome.eval.drive.missions import Mission, pose_of
-from hippodrome.sim.loop.types import Sensed
+from hippodrome.sim.loop.types import Sensed, Truth
 from hippodrome.sim.loop.world import World
 
+KINDS: Final = ("webp", "mp4")
 EVERY_STEPS: Final = 4  # steps of the loop between two pictures
 SHOWN_MS: Final = 100  # of a picture: four times as fast as the drive
 MOST: Final = 1500  # pictures; ten minutes of driving
@@ -26,6 +34,10 @@ ROAD, PLAN, BELIEF, EGO, OTHER, GOAL = (
     (205, 205, 205), (40, 110, 200), (230, 120, 40), (200, 30, 30), (90, 90, 90), (30, 140, 60)
 )  # fmt: skip
 SIGMAS: Final = 2.0  # of the belief's ellipse
+STRIP_PX, TILE_PX, GAP_PX = 128, 108, 8  # the strip below, and the pictures of the networks in it
+MOST_SHEETS: Final = 3  # modules of grid cells that are shown
+FONT, INK = cv2.FONT_HERSHEY_SIMPLEX, (20, 20, 20)
+LINE_LETTERS: Final = 32  # of the strip's words
 QUALITY: Final = 60
 
 
@@ -36,26 +48,31 @@ class Film:
         self._network = world.network
         self._lanes = [world.network.lane_points_m(k) for k in range(world.network.lane_count)]
         self._goal_m = np.array(pose_of(world.network, mission.goal_lane, mission.goal_m)[:2])
-        self._pictures: list[Image.Image] = []
+        self._pictures: list[Frame] = []
         self._camera: Frame = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         self._steps = 0
 
-    def look(self, sensed: Sensed, navigator: Navigator) -> None:
+    def look(self, sensed: Sensed, driver: Driver, command: Command) -> None:
         """Take a step in; every few of them make a picture."""
         if sensed.observation.frame is not None:
             shown = cv2.resize(_coloured(sensed.observation.frame), SIZE, interpolation=cv2.INTER_NEAREST)
             self._camera = np.asarray(shown, dtype=np.uint8)
         if self._steps % EVERY_STEPS == 0 and len(self._pictures) < MOST:
-            self._pictures.append(Image.fromarray(np.hstack([self._camera, self._from_above(sensed, navigator)])))
+            above = np.hstack([self._camera, self._from_above(sensed, driver)])
+            self._pictures.append(np.vstack([above, _strip(driver.estimate, command, sensed.truth)]))
         self._steps += 1
 
     def write(self, file: Path) -> None:
-        """Write the film as an animated WebP."""
-        with replacing(file) as temporary, temporary.open("wb") as stream:
-            first, *others = self._pictures
-            first.save(stream, "WEBP", save_all=True, append_images=others, duration=SHOWN_MS, loop=0, quality=QUALITY)
+        """Write the film: an animated WebP, or by the name of the file an MP4. Raises HippodromeError if it cannot be encoded."""
+        with replacing(file) as temporary:
+            if file.suffix == ".mp4":
+                _write_mp4(temporary, self._pictures)
+                return
+            with temporary.open("wb") as stream:
+                first, *others = (Image.fromarray(picture) for picture in self._pictures)
+                first.save(stream, "WEBP", save_all=True, append_images=others, duration=SHOWN_MS, loop=0, quality=QUALITY)
 
-    def _from_above(self, sensed: Sensed, navigator: Navigator) -> Frame:
+    def _from_above(self, sensed: Sensed, driver: Driver) -> Frame:
         truth = sensed.truth
         middle = np.array([truth.x_m, truth.y_m])
         picture = np.full((SIZE[1], SIZE[0], 3), 245, dtype=np.uint8)
@@ -67,20 +84,61 @@ class Film:
 
         for lane in self._lanes:
             cv2.polylines(picture, [drawn(lane)], False, ROAD, 6, cv2.LINE_AA)
-        if navigator.plan is not None:
-            cv2.polylines(picture, [drawn(navigator.plan.course.path.points_m)], False, PLAN, 2, cv2.LINE_AA)
+        if driver.plan is not None:
+            cv2.polylines(picture, [drawn(driver.plan.course.path.points_m)], False, PLAN, 2, cv2.LINE_AA)
         goal = drawn(self._goal_m)[0, 0]
         cv2.circle(picture, (int(goal[0]), int(goal[1])), 5, GOAL, -1, cv2.LINE_AA)
         for pose in sensed.traffic:
             _box(picture, drawn, np.asarray(pose[:3], dtype=np.float64), OTHER, (-2.2, 2.2))
         _box(picture, drawn, np.array(truth.pose_m), EGO, (-0.9, 3.6))
-        if navigator.track is not None:
-            cv2.polylines(
-                picture, [drawn(_ellipse_m(navigator.track.pose, navigator.track.covariance))], True, BELIEF, 2, cv2.LINE_AA
-            )
-        state = f"{truth.t_s:5.1f} s  {3.6 * truth.speed_mps:3.0f} km/h"
-        cv2.putText(picture, state, (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (20, 20, 20), 1, cv2.LINE_AA)
+        if driver.track is not None:
+            cv2.polylines(picture, [drawn(_ellipse_m(driver.track.pose, driver.track.covariance))], True, BELIEF, 2, cv2.LINE_AA)
         return picture
+
+
+def _strip(estimate: LocalizationEstimate | None, command: Command, truth: Truth) -> Frame:
+    """What the driver says, the ring of head-direction cells, and the sheets of grid cells, as far as there are any."""
+    strip = np.full((STRIP_PX, 2 * SIZE[0], 3), PAPER, dtype=np.uint8)
+    words = [
+        f"{truth.t_s:.0f} s   {3.6 * truth.speed_mps:.0f} km/h",
+        command.state.name.lower(),
+        *wrap(command.reason, LINE_LETTERS),
+    ]
+    for line, text in enumerate(words[:5]):
+        place = GAP_PX, 20 + 20 * line
+        cv2.putText(strip, text, place, FONT, 0.45 if line < 2 else 0.38, INK, 1, cv2.LINE_AA)
+    right = strip.shape[1]
+    for name, tile in reversed(_networks(estimate)):
+        right -= TILE_PX + GAP_PX
+        strip[GAP_PX // 2 : GAP_PX // 2 + TILE_PX, right : right + TILE_PX] = tile
+        cv2.putText(strip, name, (right, STRIP_PX - 4), FONT, 0.34, INK, 1, cv2.LINE_AA)
+    return strip
+
+
+def _networks(estimate: LocalizationEstimate | None) -> list[tuple[str, Frame]]:
+    """Names and pictures of the localizer's networks; none where there is no localizer, or its pose is given."""
+    if estimate is None or not len(estimate.grid_phase_rad):
+        return []
+    heading = float(estimate.pose[2]) if estimate.localized else None
+    tiles = [("heading", head_ring(estimate.head_direction_rad, estimate.head_reliability, heading, TILE_PX))]
+    modules = zip(estimate.grid_phase_rad, estimate.grid_reliability, strict=True)
+    sheets = [(f"grid module {k + 1}", grid_sheet(*one, TILE_PX)) for k, one in enumerate(modules)]
+    return [*tiles, *sheets[:MOST_SHEETS]]
+
+
+def _write_mp4(file: Path, pictures: Sequence[Frame]) -> None:
+    height, width = pictures[0].shape[:2]
+    named = file.with_name(f"{file.name}.mp4")  # OpenCV goes by the name
+    writer = cv2.VideoWriter(str(named), cv2.VideoWriter.fourcc(*"mp4v"), 1000.0 / SHOWN_MS, (width, height))
+    try:
+        if not writer.isOpened():
+            raise HippodromeError(f"{file}: this OpenCV writes no MP4; use --film webp")
+        for picture in pictures:
+            writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
+    finally:
+        writer.release()
+        if named.exists():
+            named.replace(file)
 
 
 def _coloured(frame: Frame) -> Frame:

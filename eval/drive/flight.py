@@ -6,16 +6,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import process_time
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
-from hippodrome.core.navigation.navigator import Navigator
-from hippodrome.core.navigation.types import DrivingState, Goal
-from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import CognitiveMap, FloatArray
-from hippodrome.eval.drive.missions import Mission, pose_of
-from hippodrome.eval.drive.rows import KnownPose, RowSpec, navigator_config
+from hippodrome.core.navigation.types import Command, DrivingState
+from hippodrome.core.types import FloatArray
+from hippodrome.eval.drive.drivers import Cockpit, Driver
+from hippodrome.eval.drive.foreign import Foreign
+from hippodrome.eval.drive.missions import Mission
+from hippodrome.eval.methods.protocol import MethodError
 from hippodrome.sim.loop.types import Event, LanePlace, Sensed
 from hippodrome.sim.loop.world import STEP_S, World
 
@@ -41,6 +41,7 @@ class Flight:
     arrived: bool  # by the navigator's own declaration
     cause: str  # why it ended, and for a mission that failed the navigator's last words
     cpu_s: float
+    failure: str = ""  # of a policy, where it did not go on to the end
 
     def column(self, name: str) -> FloatArray:
         """One column of the trace."""
@@ -53,61 +54,58 @@ def limit_s(mission: Mission) -> float:
     return min(LONGEST_S, SEARCH_S + mission.shortest_m / SLOWEST_MPS)
 
 
-def fly(
-    world: World,
-    mission: Mission,
-    row: RowSpec,
-    cognitive_map: CognitiveMap,
-    surveyed: RoadNetwork,
-    look: Callable[[Sensed, Navigator], None] | None = None,
-) -> Flight:
-    """Drive one mission. ``look`` is shown each step, for films.
+Look: TypeAlias = Callable[[Sensed, Driver, Command], None]
+
+
+def fly(world: World, mission: Mission, cockpit: Cockpit, look: Look | None = None) -> Flight:
+    """Drive one mission. ``look`` is shown each step, for films. A policy that fails ends the mission, and is told of.
 
     Raises:
         HippodromeError: the world or the map cannot be used.
     """
     sensed = world.reset(mission.seed, LanePlace(mission.start_lane, mission.start_m))
-    navigator, known = _navigator(world, row, cognitive_map, surveyed, sensed)
-    navigator.set_goal(Goal(*pose_of(surveyed, mission.goal_lane, mission.goal_m)))
     rows: list[tuple[float, ...]] = []
     events: list[Event] = []
-    standing_s, began, cause, arrived = 0.0, process_time(), "", False
-    while not cause:
-        if known is not None:
-            known.truth = sensed.truth
-        command = navigator.step(sensed.observation, sensed.radar)
-        if look is not None:
-            look(sensed, navigator)
-        rows.append(_written(sensed, navigator, command.state))
-        events += sensed.events
-        standing_s = standing_s + STEP_S if sensed.truth.speed_mps < STANDING_MPS else 0.0
-        arrived = command.state is DrivingState.ARRIVED and sensed.truth.speed_mps < STANDING_MPS
-        if arrived:
-            cause = "arrived"
-        elif sensed.truth.t_s > limit_s(mission):
-            cause = f"time is up: {command.state.name.lower()}, {command.reason}"
-        elif standing_s > STUCK_S:
-            cause = f"stands: {command.state.name.lower()}, {command.reason}"
-        else:
-            sensed = world.step(command.acceleration_mps2, command.steering_rad, command.indicator)
-    return Flight(np.array(rows), tuple(events), sensed.truth.lane_id, arrived, cause.rstrip(", "), process_time() - began)
+    standing_s, cause, failure, arrived, began, their_s = 0.0, "", "", False, process_time(), 0.0
+    driver: Driver | None = None
+    try:
+        with cockpit.driver(sensed.truth) as (driver, known):
+            began = process_time()
+            while not cause:
+                if known is not None:
+                    known.truth = sensed.truth
+                command = driver.step(sensed.observation, sensed.radar)
+                if look is not None:
+                    look(sensed, driver, command)
+                rows.append(_written(sensed, driver, command.state))
+                events += sensed.events
+                standing_s = standing_s + STEP_S if sensed.truth.speed_mps < STANDING_MPS else 0.0
+                arrived = command.state is DrivingState.ARRIVED and sensed.truth.speed_mps < STANDING_MPS
+                cause = _end(mission, sensed, command, standing_s)
+                if not cause:
+                    sensed = world.step(command.acceleration_mps2, command.steering_rad, command.indicator)
+    except MethodError as error:
+        failure = cause = f"the policy failed: {error}"
+        rows = rows or [_written(sensed, driver, DrivingState.HALTED)]
+    if isinstance(driver, Foreign):
+        their_s = driver.cpu_s
+    ours_s = process_time() - began
+    return Flight(np.array(rows), tuple(events), sensed.truth.lane_id, arrived, cause.rstrip(", "), ours_s + their_s, failure)
 
 
-def _navigator(
-    world: World, row: RowSpec, cognitive_map: CognitiveMap, surveyed: RoadNetwork, first: Sensed
-) -> tuple[Navigator, KnownPose | None]:
-    """The navigator of a row, and its pose source where that is no localizer."""
-    config = navigator_config(world.scenario, row)
-    if row.pose == "localizer":
-        return Navigator(cognitive_map, surveyed, config), None
-    scale = 1.0 if cognitive_map.log_scale is None else math.exp(float(np.median(cognitive_map.log_scale)))
-    known = KnownPose(first.truth, scale, row.pose == "truth")
-    return Navigator(cognitive_map, surveyed, config, known), known
+def _end(mission: Mission, sensed: Sensed, command: Command, standing_s: float) -> str:
+    """Why the mission ends here; empty where it goes on."""
+    if command.state is DrivingState.ARRIVED and sensed.truth.speed_mps < STANDING_MPS:
+        return "arrived"
+    if sensed.truth.t_s > limit_s(mission):
+        return f"time is up: {command.state.name.lower()}, {command.reason}"
+    return f"stands: {command.state.name.lower()}, {command.reason}" if standing_s > STUCK_S else ""
 
 
-def _written(sensed: Sensed, navigator: Navigator, state: DrivingState) -> tuple[float, ...]:
+def _written(sensed: Sensed, driver: Driver | None, state: DrivingState) -> tuple[float, ...]:
     """A row of the trace."""
-    truth, estimate, track = sensed.truth, navigator.estimate, navigator.track
+    truth = sensed.truth
+    estimate, track = (driver.estimate, driver.track) if driver is not None else (None, None)
     localized = estimate is not None and estimate.localized
     x, y, sigma = (track.pose[0], track.pose[1], track.sigma_m) if track is not None else (math.nan, math.nan, math.nan)
     return (

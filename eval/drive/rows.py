@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
@@ -12,6 +13,7 @@ from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.navigator import PoseSource
 from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, LocalizationStatus, Observation
 from hippodrome.core.views.config import CameraGeometry
+from hippodrome.eval.drive.foreign import Policy
 from hippodrome.sim.loop.types import Truth
 from hippodrome.sim.scenario import Scenario
 
@@ -28,6 +30,16 @@ class RowSpec:
     pose: Literal["localizer", "truth", "dead reckoning"] = "localizer"
     mode: Literal["coupled", "paper", "kalman", "lanes"] | None = None  # of the localizer; None: the scenario's own
     read_road: bool = True
+    policy: Policy | None = None  # of somebody else, in place of the navigator
+
+    @property
+    def stem(self) -> str:
+        """The row's name in the names of files; no policy has that of a row of ours."""
+        return self.key if self.policy is None else "policy-" + re.sub(r"[^A-Za-z0-9._-]", "-", self.key)
+
+    def made_of(self) -> tuple[str, ...]:
+        """What a policy is run by and made of; nothing for a row of ours."""
+        return () if self.policy is None else (self.policy.source, self.policy.sha256())
 
 
 ROWS: Final = (
@@ -38,7 +50,6 @@ ROWS: Final = (
     RowSpec("paper", "ours, localizer mode paper", mode="paper"),
     RowSpec("kalman", "ours, localizer mode kalman", mode="kalman"),
 )
-DEFAULT_ROWS: Final = ("ours", "truth")
 
 
 def row_named(key: str) -> RowSpec:
@@ -47,6 +58,14 @@ def row_named(key: str) -> RowSpec:
     if found is None:
         raise HippodromeError(f"--rows {key}: there is no such row; choose from {', '.join(row.key for row in ROWS)}")
     return found
+
+
+def policy_row(policy: Policy) -> RowSpec:
+    """The row of a policy. Raises HippodromeError if a row of ours is called so."""
+    taken = {name for row in ROWS for name in (row.key, row.label)}
+    if policy.name in taken:
+        raise HippodromeError(f"--policy {policy.name}: a row of ours is called so; name it otherwise, NAME={policy.source}")
+    return RowSpec(policy.name, policy.name, policy=policy)
 
 
 def navigator_config(scenario: Scenario, row: RowSpec) -> NavigatorConfig:

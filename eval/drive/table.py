@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from hippodrome.eval.results.model import Results
+from hippodrome.eval.results.model import Results, drive_of
 from hippodrome.eval.results.terminal import harmless
 
 COLUMNS: Final = (  # heading, key, format, factor
@@ -19,7 +19,7 @@ COLUMNS: Final = (  # heading, key, format, factor
     ("time x", "time_ratio", ".2f", 1.0),
     ("fix m", "metres_until_localized", ".0f", 1.0),
 )
-NAME: Final = 16  # columns of the first one
+NAME: Final = 18  # columns of the first one; the longest row's key has 14 letters
 
 
 def cells(drive: dict[str, Any]) -> list[str]:
@@ -33,7 +33,9 @@ def table_lines(results: Results) -> list[str]:
     for result in results.scenarios:
         lines.append(harmless(f"{result.name} (seed {result.seed}, noise {result.noise})")[:80])
         for row in result.rows:
-            lines.append(f"  {harmless(row.method)[: NAME - 3]:{NAME - 2}}" + "".join(f"{cell:>6}" for cell in cells(row.drive)))  # type: ignore[attr-defined]
+            drive = drive_of(row) or {}
+            name = harmless(str(drive.get("row", row.method)))[: NAME - 3]
+            lines.append(f"  {name:{NAME - 2}}" + "".join(f"{cell:>6}" for cell in cells(drive)))
     return lines
 
 
@@ -42,7 +44,7 @@ def print_table(results: Results) -> None:
     print("\n".join(table_lines(results)))
     for result in results.scenarios:
         for row in result.rows:
-            for one in row.drive["missions_detail"]:  # type: ignore[attr-defined]
+            for one in (drive_of(row) or {}).get("missions_detail", ()):
                 if not one["success"]:
                     print(
                         harmless(

@@ -17,11 +17,26 @@ from hippodrome.eval.results.model import (
     Results,
     Row,
     ScenarioResult,
+    drive_of,
+    is_driven,
     to_json,
 )
 from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
 
 FORMAT: Final = 1
+
+
+MISSIONS: Final = {  # figures of missions that are the better the smaller they are: name with unit, and definition
+    "missed (share)": "share of the missions that did not stand within 3 m of the goal's place, on its lane, and say so",
+    "1 - SPL (share)": "one less the success weighted by path length",
+    "collisions at fault (times)": "collisions with vehicles that were the ego's fault, in all missions",
+    "wrong way (times)": "times that the ego drove against its lane's direction, in all missions",
+    "false arrivals (times)": "times that an arrival was said elsewhere than at the goal",
+    "red lights (per km)": "red lights run, per driven kilometre",
+    "rights of way (per km)": "rights of way taken, per driven kilometre",
+    "outside the lane (%)": "share of the time with a wheel outside of the lane, or off the paving in junctions",
+    "time (ratio)": "time of successful missions over that of SUMO's own driver on them, mean",
+}
 
 
 class GateError(HippodromeError):
@@ -102,6 +117,8 @@ def question_of(result: ScenarioResult) -> str:
     configuration: dict[str, Any] = getattr(result, "configuration", None) or {}
     asked = {key: value for key, value in configuration.items() if key not in DRIVE_INDEPENDENT_KEYS}
     driven = [result.network.edges, round(result.network.km, 3), result.frames]  # a file's name does not say what is in it
+    if is_driven(result):  # how many missions are asked for is a question, of an evaluation it is none
+        driven.append(configuration.get("missions", {}).get("count"))
     return hashlib.sha256(json.dumps([asked, driven], sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -118,6 +135,8 @@ def _row(result: ScenarioResult, row: Row) -> BaselineRow:
 
 
 def _figures(row: Row) -> dict[str, Figure]:
+    if (drive := drive_of(row)) is not None:
+        return mission_figures(drive)
     errors: dict[str, ErrorSummary | None] = {"APE": row.ape, "RPE": row.rpe}
     figures = {
         f"{name} mean (m)": Figure(value=error.mean_m, definition=error.definition)
@@ -128,3 +147,15 @@ def _figures(row: Row) -> dict[str, Figure]:
     if located is not None and located.error_mean_m is not None:
         figures["localization error mean (m)"] = Figure(value=located.error_mean_m, definition=located.definition)
     return figures
+
+
+def mission_figures(drive: dict[str, Any]) -> dict[str, Figure]:
+    """What the gate compares of a row's missions; a figure that a row has not, such as the time of no success, is left out."""
+    km = max(drive["driven_km"], 1e-3)
+    values = (
+        1.0 - drive["success_rate"], 1.0 - drive["spl"], drive["collisions_at_fault"], drive["wrong_way"],
+        drive["false_arrivals"], drive["red_lights"] / km, drive["rights_of_way"] / km, 100.0 * drive["outside_lane_share"],
+        drive["time_ratio"],
+    )  # fmt: skip
+    named = zip(MISSIONS.items(), values, strict=True)
+    return {name: Figure(value=float(value), definition=definition) for (name, definition), value in named if value is not None}

@@ -20,11 +20,32 @@ MOVED: Final = 0.005  # a figure none of whose pairs changes by more than this s
 TOWN_NOTICED: Final = (
     0.15  # a town that becomes worse by more than this share is not passed in silence, whatever the other towns do
 )
-FLOOR_M: Final = 0.01  # errors below a centimetre count as one: their ratios mean nothing
-# A single pair whose error grows by this factor and by this length fails by itself, for one outlier widens the test's own error
-# bar. A doubled error below this length is still inside the lane.
+# A single pair whose figure grows by this factor and by its unit's jump fails by itself, for one outlier widens the test's own
+# error bar.
 JUMP_RATIO: Final = 2.0
-JUMP_M: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What is little and what is much in a unit.
+
+    Args:
+        floor: Smaller values count as this one: their ratios mean nothing.
+        jump: A value that more than doubles and grows by more than this fails by itself.
+    """
+
+    floor: float
+    jump: float
+
+
+METRES: Final = Scale(0.01, 0.5)  # a doubled error below half a metre is still inside the lane
+SCALES: Final = {  # by the unit in the figure's name
+    "(share)": Scale(0.05, 0.5),  # of ten missions half a one; half of them is no chance any more
+    "(times)": Scale(0.5, 0.5),  # one collision more where there was none is one too many
+    "(per km)": Scale(0.1, 2.0),
+    "(%)": Scale(0.1, 2.0),  # of the time outside of the lane
+    "(ratio)": Scale(0.01, 0.5),
+}
 
 Key: TypeAlias = tuple[str, int, str]  # scenario, seed, method
 
@@ -137,13 +158,18 @@ def _place(key: Key) -> str:
     return f"'{scenario}', seed {seed}, '{method}'"
 
 
+def scale_of(figure: str) -> Scale:
+    """The scale of a figure's unit; without one that is known it is an error in metres."""
+    return next((scale for unit, scale in SCALES.items() if figure.endswith(unit)), METRES)
+
+
 def _pairs(now: Mapping[Key, BaselineRow], then: Mapping[Key, BaselineRow]) -> dict[tuple[str, str], list[Pair]]:
     """The pairs of each method and figure: one for every scenario and seed in which both have the figure."""
     pairs: dict[tuple[str, str], list[Pair]] = {}
     for (scenario, seed, method), cell in sorted(now.items()):
         before = then[scenario, seed, method].figures
         for name in sorted(set(cell.figures) & set(before)):
-            old_m, new_m = (max(figures[name].value, FLOOR_M) for figures in (before, cell.figures))
+            old_m, new_m = (max(figures[name].value, scale_of(name).floor) for figures in (before, cell.figures))
             pairs.setdefault((method, name), []).append(Pair(scenario, seed, old_m, new_m))
     return pairs
 
@@ -256,5 +282,5 @@ def _jumps(now: Mapping[Key, BaselineRow], then: Mapping[Key, BaselineRow], prov
     return [
         f"{_place(key)}: {name} was {old_m:.3g} and is {new_m:.3g}"
         for key, name, old_m, new_m in pairs
-        if (key[2], name) not in proven and new_m > JUMP_RATIO * old_m and new_m - old_m > JUMP_M
+        if (key[2], name) not in proven and new_m > JUMP_RATIO * old_m and new_m - old_m > scale_of(name).jump
     ]

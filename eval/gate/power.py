@@ -46,6 +46,8 @@ def print_power(baseline: Baseline, method: str, console: Console) -> None:
     """
     if method not in (methods := {cell.method for cell in baseline.cells}):
         raise GateError(f"the baseline has no method '{method}'; it has: {', '.join(sorted(methods)) or 'none'}")
+    if not any(TARGET in cell.figures for cell in baseline.cells if cell.method == method):
+        raise GateError(f"'{method}' has no {TARGET} in the baseline, in which regressions are planted; name a method that maps")
     trials = {(trial.shaken, trial.planted): trial.failed for trial in power_of(baseline, method)}
     pairs = sum(cell.method == method for cell in baseline.cells)
     table = Table(title=f"share of builds that fail; {method}, {pairs} pairs", title_justify="left", box=box.SIMPLE_HEAD)

@@ -52,8 +52,9 @@ OUTCOMES = {
 
 
 def _table(moved: Sequence[Change]) -> Table:
+    unit = "m" if all(change.figure.endswith(UNIT) for change in moved) else "m where a figure has no unit"
     table = Table(
-        title="what moved (geometric means over the pairs, m)", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
+        title=f"what moved (geometric means over the pairs, {unit})", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
     )
     for head in ("method", "figure", "before", "after", "change", "verdict"):
         table.add_column(head, justify="left" if head in ("method", "figure", "verdict") else "right", no_wrap=head != "verdict")
@@ -68,7 +69,8 @@ def _why(change: Change) -> str:
     """A regression, or why the pairs do not tell of one, in words."""
     told = f"; {change.undecided}" if change.undecided else ""
     interval = f"{_interval(change)}, p {change.p_worse:.1g}"
-    return f"{change.figure.removesuffix(UNIT)} {_percent(change.ratio)} ({interval}); most in {change.worst} m{told}"
+    unit = " m" if change.figure.endswith(UNIT) else ""
+    return f"{change.figure.removesuffix(UNIT)} {_percent(change.ratio)} ({interval}); most in {change.worst}{unit}{told}"
 
 
 UNIT = " mean (m)"

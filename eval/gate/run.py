@@ -11,15 +11,17 @@ from typing import IO
 
 from hippodrome._files import write_atomically
 from hippodrome.eval.contest.entry import Added
+from hippodrome.eval.drive.page import write_page
+from hippodrome.eval.drive.run import drive_scenarios
 from hippodrome.eval.gate.baseline import Baseline, GateError, baseline_of, read_baseline, write_baseline
 from hippodrome.eval.gate.compare import Verdict, compare
 from hippodrome.eval.gate.report import junit_xml, outcome_of, print_verdict, summary_markdown
 from hippodrome.eval.gate.statistics import MIN_PAIRS
 from hippodrome.eval.report.pages import write_trial_page
-from hippodrome.eval.results.model import Results
+from hippodrome.eval.results.model import Results, write_results
 from hippodrome.eval.results.terminal import PlainConsole
 from hippodrome.eval.results.thresholds import failed_limits
-from hippodrome.eval.run import load_scenarios, run_scenarios
+from hippodrome.eval.run import RESULTS, load_scenarios, run_scenarios
 from hippodrome.sim.scenario import Thresholds
 
 SUMMARY = "GITHUB_STEP_SUMMARY"  # where GitHub Actions wants Markdown
@@ -137,6 +139,17 @@ def broken_limits(runs: Sequence[Results]) -> list[str]:
 
 
 def _run(request: GateRequest, seed: int) -> Results:
-    """One seed; recordings that are there already are not made again, everything after them is."""
-    scenarios = load_scenarios(request.scenarios, None, seed, request.methods)
-    return run_scenarios(scenarios, request.workers, request.out / f"seed-{seed}")
+    """One seed; recordings and missions that are there already are not made again, everything else is.
+
+    A scenario with missions is driven, any other one evaluated.
+    """
+    scenarios, out = load_scenarios(request.scenarios, None, seed, request.methods), request.out / f"seed-{seed}"
+    evaluated = [one for one in scenarios if one.missions.count is None]
+    driven = [one for one in scenarios if one.missions.count is not None]
+    found = run_scenarios(evaluated, request.workers, out).scenarios if evaluated else ()
+    if driven:
+        results, tasks = drive_scenarios(driven, request.workers, out)
+        write_page(results, tasks, out)
+        found = (*found, *results.scenarios)
+        write_results(out / RESULTS, Results(scenarios=found))
+    return Results(scenarios=found)

@@ -18,7 +18,9 @@ from hippodrome.eval.methods.protocol import Answer, Cost, Given, Localized, Map
 from hippodrome.eval.programs.environments import words_of
 from hippodrome.eval.programs.process import POLL_S, Limits, Process, last_words, started
 from hippodrome.proto import method_stream_pb2 as pb
+from hippodrome.proto.driving import observation_message
 from hippodrome.sim.method_spec import MethodSpec
+from hippodrome.sim.render.camera import CameraSpec
 
 VERSION: Final = 1
 MAX_MESSAGE_BYTES: Final = 64 << 20  # of a method's answer: the trajectory of a drive of a day
@@ -53,7 +55,7 @@ class StreamMapper:
         times_s, answers, steps_s, cpu_s = [], [], [], []
         words = words_of(self._spec, command)
         with started(words, given.folder, Limits.of(self._spec), given.concealed, fed=True) as process:
-            line = _Line(process)
+            line = Line(process)
             ready = line.asked(pb.ToMethod(begin=_begin(phase, given, folder)), "ready").ready
             if ready.version != VERSION:
                 raise MethodError(f"it speaks version {ready.version} of the stream, this harness version {VERSION}")
@@ -91,7 +93,7 @@ def _on_the_way(times_s: list[float], answers: list[pb.Answer]) -> Trajectory | 
     return Trajectory(table[:, 0], table[:, 1:]) if known else None
 
 
-class _Line:
+class Line:
     """Messages to and from a process, with its limit of time."""
 
     def __init__(self, process: Process) -> None:
@@ -199,17 +201,28 @@ def _varint(value: int) -> bytes:
     return bytes(found)
 
 
-def _begin(phase: pb.Begin.Phase, given: Given, folder: Path) -> pb.Begin:
-    camera = pb.Camera(
-        width=given.camera.width,
-        height=given.camera.height,
-        focal_px=given.camera.focal_px(),
-        rate_hz=given.camera.rate_hz,
-        ahead_of_rear_axle_m=given.camera.forward_m,
-        height_m=given.camera.height_m,
-        baseline_m=given.camera.stereo_baseline_m or 0.0,
+def camera_message(camera: CameraSpec) -> pb.Camera:
+    """A camera as a program is told of it."""
+    return pb.Camera(
+        width=camera.width,
+        height=camera.height,
+        focal_px=camera.focal_px(),
+        rate_hz=camera.rate_hz,
+        ahead_of_rear_axle_m=camera.forward_m,
+        height_m=camera.height_m,
+        baseline_m=camera.stereo_baseline_m or 0.0,
     )
-    message = pb.Begin(version=VERSION, phase=phase, camera=camera, rate_hz=given.rate_hz, seed=given.seed, folder=str(folder))
+
+
+def _begin(phase: pb.Begin.Phase, given: Given, folder: Path) -> pb.Begin:
+    message = pb.Begin(
+        version=VERSION,
+        phase=phase,
+        camera=camera_message(given.camera),
+        rate_hz=given.rate_hz,
+        seed=given.seed,
+        folder=str(folder),
+    )
     if given.metres_per_unit is not None:
         message.metres_per_unit = given.metres_per_unit
     if given.start is not None:
@@ -226,13 +239,9 @@ def _lanes(roads: RoadNetwork) -> Iterator[pb.Lane]:
 
 
 def _observation(one: Observation) -> pb.Observation:
-    message = pb.Observation(t_s=one.t_s, dt_s=one.dt_s, speed=one.speed, yaw_rate_radps=one.yaw_rate_radps)
-    if one.frame is not None:
-        message.height, message.width = one.frame.shape[:2]
-        message.channels = 1 if one.frame.ndim == 2 else 3
-        message.pixels = one.frame.tobytes()
-        if isinstance(one, StereoObservation) and one.right is not None:
-            message.right_pixels = one.right.tobytes()
+    message = observation_message(one)
+    if isinstance(one, StereoObservation) and one.frame is not None and one.right is not None:
+        message.right_pixels = one.right.tobytes()
     return message
 
 

@@ -60,11 +60,17 @@ def brain_at_work(files: ScenarioFiles) -> Html | None:
     return joined(element("div", canvas, class_="traces"), element("ul", parts, class_="facts"))
 
 
-def towns(results: Results, found: Sequence[ScenarioFiles]) -> Html | None:
-    """A card for each scenario that has a map, which tell their stories at the same time; None if none has."""
+def towns(results: Results, found: Sequence[ScenarioFiles], places: Sequence[int]) -> Html | None:
+    """A card for each scenario that has a map, which tell their stories at the same time; None if none has.
+
+    Args:
+        results: The scenarios.
+        found: What lies beside the results of each.
+        places: Numbers of the scenarios' sections on the page.
+    """
     cards = [
         _card(place, scenario)
-        for place, (scenario, files) in enumerate(zip(results.scenarios, found, strict=True))
+        for place, scenario, files in zip(places, results.scenarios, found, strict=True)
         if files.evidence is not None
     ]
     if not cards:

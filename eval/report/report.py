@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from hippodrome._files import write_atomically
+from hippodrome.eval.report.drives import DRIVE_PAGE, TITLE, mission_overview, without_missions
 from hippodrome.eval.report.files import ScenarioFiles, read_scenario_files
 from hippodrome.eval.report.glance import at_a_glance
 from hippodrome.eval.report.markup import Html, element, joined
@@ -59,23 +60,27 @@ def report_html(results: Results, out: Path) -> str:
     links += [element("a", one.name, href=f"#{anchor(place)}") for place, one in enumerate(results.scenarios)]
     body = [
         element("header", element("h1", "Topometric maps, scored"), element("nav", links, class_="tabs", aria_label="Towns")),
-        element("main", _all_scenarios(results, found), sections),
+        element("main", _all_scenarios(results, found, (out / DRIVE_PAGE).exists()), sections),
         element("footer", "Made by ", element("code", "hippodrome eval"), "; ", element("code", "hippodrome report DIR"),
                 " makes it again from results.json and the files beside it."),
     ]  # fmt: skip
     return page("hippodrome report", body, SCRIPTS, EARLY)
 
 
-def _all_scenarios(results: Results, found: Sequence[ScenarioFiles]) -> Html:
-    """The first panel: what was done, every town at a look, and one line of figures for each."""
+def _all_scenarios(results: Results, found: Sequence[ScenarioFiles], has_drives: bool) -> Html:
+    """The first panel: what was done, every town at a look, and one line of figures for each; then the missions."""
+    missions = mission_overview(results)
+    bare = [without_missions(one) for one in results.scenarios]
+    kept = [place for place, one in enumerate(bare) if one.rows or missions is None]
+    maps = Results(scenarios=tuple(bare[place] for place in kept))
+    drives = element("p", element("a", "The driven ways, mission by mission", href=DRIVE_PAGE)) if has_drives else None
     return element(
         "section",
-        element("p", _lede(results), class_="lede"),
-        towns(results, found),
-        element("h2", "At a glance"),
-        at_a_glance(results, found),
-        element("h2", "All scenarios"),
-        overview(results, quoted_rows()),
+        element("p", _lede(maps), class_="lede") if kept else None,
+        towns(maps, [found[place] for place in kept], kept) if kept else None,
+        joined(element("h2", "At a glance"), at_a_glance(maps, [found[place] for place in kept])) if kept else None,
+        joined(element("h2", "All scenarios"), overview(maps, quoted_rows(), kept)) if kept else None,
+        joined(element("h2", TITLE), missions, drives) if missions else None,
         class_="panel",
         id=COMPARE,
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 from hippodrome.eval.report import comparison
 from hippodrome.eval.report.commands import command_lines
+from hippodrome.eval.report.drives import TITLE, mission_table, without_missions
 from hippodrome.eval.report.evidence import MapEvidence
 from hippodrome.eval.report.files import Picture, ScenarioFiles
 from hippodrome.eval.report.markup import Child, Html, data_script, element, joined
@@ -38,13 +39,17 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         quoted: The paper's rows, which stand below ours.
         files: What lies beside the results.
     """
+    missions, verdict = mission_table(scenario), _verdict(scenario)
+    failures, scenario = _failures(scenario), without_missions(scenario)
+    if not scenario.rows and missions:
+        return _driven_section(place, scenario, verdict, failures, missions)
     rows = (*scenario.rows, *quoted)
     return element(
         "section",
-        element("h2", scenario.name, " ", _verdict(scenario)),
+        element("h2", scenario.name, " ", verdict),
         player(files),
         element("p", scenario_title(scenario), class_="note"),
-        _failures(scenario),
+        failures,
         _headline(scenario),
         element("h3", "Mapping (Table I)"),
         mapping_table(scenario, quoted),
@@ -54,6 +59,7 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         _titled("Cheaper than ORB-SLAM3", comparison.ratios(files.ratios)),
         _titled("What each method is given", comparison.fairness(scenario)),
         _folded("What each figure means", _definitions(rows)),
+        _titled(TITLE, missions),
         _titled("The brain at work", brain_at_work(files)),
         _titled("Map", _interactive_map(files) if files.evidence else None),
         _titled("Why is it wrong here? The worst places", mapping_places(files, scenario.name)),
@@ -68,6 +74,21 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         data_town=scenario.name,
         id=anchor(place),
         style=_frames_style(files),
+    )
+
+
+def _driven_section(place: int, scenario: ScenarioResult, verdict: Html | None, failures: Html | None, missions: Html) -> Html:
+    """The section of a scenario of which there are missions alone."""
+    return element(
+        "section",
+        element("h2", scenario.name, " ", verdict),
+        failures,
+        element("h3", TITLE),
+        missions,
+        _folded("Effective configuration", _configuration(scenario)),
+        class_="panel",
+        data_town=scenario.name,
+        id=anchor(place),
     )
 
 

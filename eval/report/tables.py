@@ -63,8 +63,14 @@ def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Se
     return scrolling(element("table", head, element("tbody", body)), label)
 
 
-def overview(results: Results, quoted: Sequence[Row]) -> Html:
-    """One line per scenario: APE of every method, and how the second drive was localized; the paper's figures below."""
+def overview(results: Results, quoted: Sequence[Row], places: Sequence[int]) -> Html:
+    """One line per scenario: APE of every method, and how the second drive was localized; the paper's figures below.
+
+    Args:
+        results: The scenarios.
+        quoted: The paper's rows.
+        places: Numbers of the scenarios' sections on the page.
+    """
     measured = list(dict.fromkeys(row.method for scenario in results.scenarios for row in scenario.rows))[::-1]  # ours first
     localizing = [method for method in measured if any(_located(_row(one, method)) for one in results.scenarios)]
     groups: list[tuple[str, Sequence[str]]] = [("Scenario", ()), ("Mean APE of the map (m)", measured)]
@@ -79,7 +85,7 @@ def overview(results: Results, quoted: Sequence[Row]) -> Html:
             f"{scenario.duration_s:,.0f}",
             f"{scenario.frames:,}",
         ]
-        for place, scenario in enumerate(results.scenarios)
+        for place, scenario in zip(places, results.scenarios, strict=True)
     ]
     note = element("p", f"The paper's APE: {_paper_line(quoted)} ({QUOTED_NOTE}).", class_="note") if quoted else None
     return Html(grouped_table(groups, rows, "all scenarios") + (note or ""))

@@ -146,6 +146,17 @@ class Results(_Model):
     scenarios: tuple[ScenarioResult, ...]
 
 
+def drive_of(row: Row) -> dict[str, Any] | None:
+    """The figures of a row's missions; None for a row of maps and localization."""
+    figures = getattr(row, "drive", None)
+    return figures if isinstance(figures, dict) else None
+
+
+def is_driven(result: ScenarioResult) -> bool:
+    """Whether the result is one of missions alone."""
+    return bool(result.rows) and all(drive_of(row) is not None for row in result.rows)
+
+
 def result_of(results: Results, name: str) -> ScenarioResult:
     """The result of the scenario ``name``, which must be there."""
     return next(result for result in results.scenarios if result.name == name)

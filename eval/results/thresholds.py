@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from pydantic import ValidationError
 
-from hippodrome.eval.results.model import Row, ScenarioResult
+from hippodrome.eval.results.model import Row, ScenarioResult, drive_of, is_driven
+from hippodrome.sim.mission_spec import MissionLimits
 from hippodrome.sim.scenario import Thresholds
+
+AT_LEAST: Final = ("success_rate", "spl", "driving_score")  # limits of missions that a figure must reach
+AT_MOST: Final = (
+    "collisions_at_fault", "wrong_way", "false_arrivals", "red_lights", "rights_of_way", "outside_lane_share", "time_ratio",
+)  # fmt: skip
 
 
 def limits_missed(result: ScenarioResult) -> list[str] | None:
@@ -25,6 +33,32 @@ def failed_limits(limits: Thresholds, result: ScenarioResult) -> list[str]:
         limits: The scenario's limits, and the label of the method that they are for.
         result: The scenario's result.
     """
+    if is_driven(result):  # missions alone: nothing was mapped and localized for the tables
+        return failed_mission_limits(limits.drive, result)
+    has_missions = any(drive_of(row) is not None for row in result.rows)
+    return [*_failed_limits(limits, result), *(failed_mission_limits(limits.drive, result) if has_missions else [])]
+
+
+def failed_mission_limits(limits: MissionLimits, result: ScenarioResult) -> list[str]:
+    """One line per limit of missions that does not hold; a limit whose figure is missing does not hold."""
+    asked = {name: limit for name in (*AT_LEAST, *AT_MOST) if (limit := getattr(limits, name)) is not None}
+    if not asked:
+        return []
+    rows = {row.method: drive for row in result.rows if (drive := drive_of(row)) is not None}
+    name = next((name for name, drive in rows.items() if limits.row in (name, drive.get("row"))), None)
+    if name is None:
+        return [f"no row '{limits.row}' of missions"]
+    found = {figure: rows[name].get(figure) for figure in asked}
+    return [
+        f"{name}: {figure} is {'missing' if value is None else f'{value:.3g}'}, "
+        f"the limit is {'at least ' if figure in AT_LEAST else ''}{asked[figure]:g}"
+        for figure, value in found.items()
+        if value is None or (value < asked[figure] if figure in AT_LEAST else value > asked[figure])
+    ]
+
+
+def _failed_limits(limits: Thresholds, result: ScenarioResult) -> list[str]:
+    """The limits of maps and localization."""
     row = next((row for row in result.rows if row.method == limits.method and not row.quoted), None)
     if row is None:
         return [f"no row '{limits.method}'"]

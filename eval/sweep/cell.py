@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from hippodrome.core.types import Trajectory
+from hippodrome.eval.drive.run import drive_here
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.files.trajectories import read_tum
 from hippodrome.eval.methods.materials import score_trajectory
@@ -75,6 +76,11 @@ class CellTask:
     code: str  # hash of the code of the process that hands out the tasks
 
 
+def roles_of(cell: SweepCell) -> tuple[Role, ...]:
+    """The drives that a cell needs: missions are driven on the map of the first one."""
+    return ROLES if cell.scenario.missions.count is None else ("mapping",)
+
+
 def make_recording(task: RecordingTask) -> str:
     """Record one drive unless it is on disk; the recording's folder."""
     _require_same_code(task.code)
@@ -86,15 +92,22 @@ def make_recording(task: RecordingTask) -> str:
 
 
 def run_cell(task: CellTask) -> CellResult:
-    """Evaluate a cell into its folder. A machine that does not share the sweep's folder makes the recordings that it needs."""
+    """Evaluate a cell into its folder, or drive its missions, if it has some.
+
+    A machine that does not share the sweep's folder makes the recordings that it needs.
+    """
     _require_same_code(task.code)
-    for role in ROLES:
+    for role in roles_of(task.cell):
         make_recording(RecordingTask(RecordingPlan(task.cell.scenario, role, task.out), task.code))
     folder = task.out / "cells" / task.cell.key
     folder.mkdir(parents=True, exist_ok=True)
     for name in SHARED:
         if not (folder / name).exists():
             (folder / name).symlink_to(Path("..", "..", name))
+    if task.cell.scenario.missions.count is not None:
+        with _one_at_a_time:
+            driven = drive_here(task.cell.scenario, folder)
+        return CellResult(parameters=dict(task.cell.parameters), result=driven, samples={})
     with _one_at_a_time:
         result = evaluate_scenario(EvaluationTask(task.cell.scenario, folder, figures=False))
     evidence = folder / task.cell.scenario.name

@@ -123,7 +123,7 @@ def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
 
 def cell_code_sha256() -> str:
     """Hash of the code that a cell's figures and samples come from."""
-    return figure_code_sha256("eval/sweep/cell.py")
+    return figure_code_sha256("eval/sweep/cell.py", "eval/drive/*.py")
 
 
 def _cells(scenario: Scenario, parameters: Sequence[Parameter]) -> Iterator[SweepCell]:

@@ -15,7 +15,7 @@ from hippodrome.eval.pool import progress_bar
 from hippodrome.eval.report.pages import write_trial_page
 from hippodrome.eval.results.model import Results, to_json, write_results
 from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
-from hippodrome.eval.sweep.cell import ROLES, CellResult, CellTask, RecordingTask, make_recording, run_cell
+from hippodrome.eval.sweep.cell import CellResult, CellTask, RecordingTask, make_recording, roles_of, run_cell
 from hippodrome.eval.sweep.executors import Failure, Runner, SweepError, dask_cluster, local_processes
 from hippodrome.eval.sweep.grid import Parameter, SweepCell, cell_code_sha256, make_grid
 from hippodrome.eval.sweep.table import pooled_rows, sweep_markdown
@@ -79,7 +79,7 @@ def sweep(
 
 def _recordings(cells: Sequence[SweepCell], out: Path) -> list[RecordingTask]:
     """One task for each drive, however many cells it serves."""
-    plans = dict.fromkeys(RecordingPlan(_driven(cell), role, out) for cell in cells for role in ROLES)
+    plans = dict.fromkeys(RecordingPlan(_driven(cell), role, out) for cell in cells for role in roles_of(cell))
     return [RecordingTask(plan, cell_code_sha256()) for plan in plans]
 
 

@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from hippodrome.eval.drive.scoring import row_result
 from hippodrome.eval.metrics.trajectory import pool
+from hippodrome.eval.results.drives import DRIVE_COLUMNS, drive_cells
 from hippodrome.eval.results.markdown import table
-from hippodrome.eval.results.model import Row, summarize
+from hippodrome.eval.results.model import Row, drive_of, summarize
 from hippodrome.eval.sweep.cell import CellResult
 from hippodrome.eval.sweep.grid import SweepCell
 
 NONE = "-"  # what stands for a figure that there is not
+NOTE = "Means, percentiles and maxima are over the samples of all runs together; the worst run is the one with the greatest mean."
 HEAD = ("setting", "method", "runs", "failed", "APE mean (m)", "median", "p95", "max", "worst run", "RPE 20 m (m)",
         "localized", "localization mean (m)", "p95", "max", "false fixes")  # fmt: skip
 
@@ -48,7 +51,18 @@ def _pooled(label: str, method: str, cells: Sequence[tuple[SweepCell, CellResult
         "worst": _worst(rows),
         "localized": _localized(rows),
         **pooled,
+        **_driven(rows),
     }
+
+
+def _driven(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, Any]:
+    """The figures of the missions of all cells together; nothing where there are none."""
+    drives = [drive for _, row in rows if (drive := drive_of(row)) is not None]
+    if not drives:
+        return {}
+    missions = [mission for drive in drives for mission in drive["missions_detail"]]
+    figures = {key: value for key, value in row_result(missions, None).items() if key not in ("missions_detail", "definitions")}
+    return {"drive": figures}
 
 
 def _worst(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, Any] | None:
@@ -71,9 +85,17 @@ def _localized(rows: Sequence[tuple[SweepCell, Row]]) -> dict[str, int] | None:
 
 def sweep_markdown(rows: Sequence[Mapping[str, Any]], failures: Sequence[tuple[str, str]]) -> str:
     """The table, and the cells that have no result."""
-    lines = ["# Sweep", "", *table(HEAD, map(_line, rows), align="ll" + "r" * (len(HEAD) - 2))]
-    lines += ["", "Means, percentiles and maxima are over the samples of all runs together; the worst run is the one with the "
-              "greatest mean.", ""]  # fmt: skip
+    lines = ["# Sweep", ""]
+    if evaluated := [row for row in rows if "drive" not in row]:
+        lines += table(HEAD, map(_line, evaluated), align="ll" + "r" * (len(HEAD) - 2))
+        lines += ["", NOTE, ""]
+    if driven := [row for row in rows if "drive" in row]:
+        lines += ["## Missions", ""] if evaluated else []
+        heads = ("setting", "row", "runs", "missions", *(column.title for column in DRIVE_COLUMNS))
+        cells = [[row["setting"], row["method"], str(row["runs"]), str(row["drive"]["missions"]), *drive_cells(row["drive"])]
+                 for row in driven]  # fmt: skip
+        lines += table(heads, cells, align="ll" + "r" * (len(heads) - 2))
+        lines += ["", "Figures are over the missions of all runs together; docs/loop.md says what each is.", ""]
     if failures:
         lines += [f"## {len(failures)} cell(s) without a result", "", "The same command runs these, and only these, again.", ""]
         lines += [f"- {name}: {cause}" for name, cause in failures]

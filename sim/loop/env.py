@@ -5,15 +5,26 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
 from hippodrome._folders import folder_of_this_process
-from hippodrome.core.navigation.types import Goal, Indicator, Lamp, Radar
+from hippodrome.core.navigation.spaces import (
+    ACCELERATION_RANGE_MPS2,
+    FASTEST_TURN_RADPS,
+    FASTEST_UNITS,
+    RADAR_REACH_M,
+    STEERING_RANGE_RAD,
+    Action,
+    Observed,
+    indicator_of,
+    mapped,
+    observed,
+)
+from hippodrome.core.navigation.types import Goal, Indicator, Lamp
 from hippodrome.core.types import Frame, HippodromeError
 from hippodrome.sim.loop.reward import Reward
 from hippodrome.sim.loop.top_view import TopView, beside
@@ -21,15 +32,8 @@ from hippodrome.sim.loop.types import EventKind, LanePlace, Sensed
 from hippodrome.sim.loop.world import STEP_S, World
 from hippodrome.sim.scenario import Scenario
 
-ACCELERATION_RANGE_MPS2: Final = (-5.0, 5.0)  # of highway-env's ContinuousAction; the car itself gains 4 m/s^2 at most
-STEERING_RANGE_RAD: Final = (-0.25 * math.pi, 0.25 * math.pi)  # the same; the car's wheels turn by 42 degrees at most
-FASTEST_UNITS: Final = 1000.0  # map units per second, and rad per second: bounds of what is observed, never reached
-FASTEST_TURN_RADPS: Final = 10.0
-RADAR_REACH_M: Final = 100.0  # said where no road user is in reach
 ARRIVED_M, ARRIVED_RAD, ARRIVED_MPS = 3.0, 0.25 * math.pi, 0.1
 View: TypeAlias = Literal["camera", "top", "both"]
-Observed: TypeAlias = dict[str, Any]
-Action: TypeAlias = NDArray[Any]
 Place: TypeAlias = LanePlace | tuple[str, float]
 
 
@@ -120,9 +124,9 @@ class TownEnv(gymnasium.Env[Observed, Action]):
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Drives on for a tenth of a second."""
         numbers = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
-        accel = _mapped(float(numbers[0]), self.options.acceleration_range_mps2)
-        steering = _mapped(float(numbers[1]), self.options.steering_range_rad)
-        indicator = Indicator(int(np.sign(round(1.5 * float(numbers[2]))))) if self.options.indicators else Indicator.STRAIGHT
+        accel = mapped(float(numbers[0]), self.options.acceleration_range_mps2)
+        steering = mapped(float(numbers[1]), self.options.steering_range_rad)
+        indicator = indicator_of(float(numbers[2])) if self.options.indicators else Indicator.STRAIGHT
         return self.drive(accel, steering, indicator)
 
     def drive(
@@ -154,12 +158,8 @@ class TownEnv(gymnasium.Env[Observed, Action]):
         observation = sensed.observation
         if observation.frame is not None:
             self._frame = observation.frame
-        return {
-            "frame": self._frame if observation.frame is not None else self._frame.copy(),
-            "speed": _boxed(observation.speed, FASTEST_UNITS),
-            "yaw_rate": _boxed(observation.yaw_rate_radps, FASTEST_TURN_RADPS),
-            **(_radar(sensed.radar) if self.options.radar else {}),
-        }
+        frame = self._frame if observation.frame is not None else self._frame.copy()
+        return observed(observation, sensed.radar if self.options.radar else None, frame)
 
     def _info(self, sensed: Sensed, fines: dict[str, float]) -> dict[str, Any]:
         return {"truth": asdict(sensed.truth), "events": [asdict(event) for event in sensed.events], "fines": fines}
@@ -171,22 +171,3 @@ class TownEnv(gymnasium.Env[Observed, Action]):
         near = math.hypot(truth.x_m - goal.x_m, truth.y_m - goal.y_m) <= ARRIVED_M
         turn = abs((truth.heading_rad - goal.heading_rad + math.pi) % (2.0 * math.pi) - math.pi)
         return near and turn <= ARRIVED_RAD and truth.speed_mps <= ARRIVED_MPS
-
-
-def _mapped(number: float, bounds: tuple[float, float]) -> float:
-    """A number in [-1, 1] as one between the bounds."""
-    return bounds[0] + 0.5 * (number + 1.0) * (bounds[1] - bounds[0])
-
-
-def _boxed(value: float, most: float) -> Action:
-    """A number as an array (1,) in single precision, within its bounds."""
-    return np.clip(np.array([value], dtype=np.float32), -most, most)
-
-
-def _radar(radar: Radar) -> Observed:
-    return {
-        "gap_m": np.clip(np.array([radar.gap_m], dtype=np.float32), 0.0, RADAR_REACH_M),
-        "closing_mps": _boxed(radar.closing_mps, FASTEST_UNITS),
-        "way_is_free": int(radar.way_is_free),
-        "lamp": int(radar.lamp),
-    }

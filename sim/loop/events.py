@@ -25,14 +25,14 @@ class Watch:
 
     *Collision*: the box of the ego and that of another vehicle overlap by more than 5 cm; at fault as ``is_at_fault`` says.
     *Building*: the ego's body touches one. *Kerb*: a wheel stands more than 5 cm off everything that is paved for cars: lanes,
-    junctions, turning places. *Left lane*: outside of junctions a wheel stands more than 5 cm outside of the ego's lane and those
-    beside it in the same direction. *Left road*: the middle of the ego is off everything that is paved. *Wrong way*: outside of
-    junctions the middle of the moving ego has been for half a second on a lane that runs against it and on none that runs with
-    it. *Red light*: the front bumper passes the end of a lane whose signal for the way taken is red, before and after the step;
-    yellow is none. *Right of way*: the front bumper enters a junction and a vehicle that the ego had to let pass, on a way that
-    crosses or meets the ego's, would be there within 2 s at its present speed or is in the first half of its way through; or
-    such a vehicle brakes with more than 4 m/s^2 while the ego is in the junction. *Put back*: SUMO had taken the ego off
-    the road. What has not been seen for a second is over; if it comes again, it is a new event.
+    junctions, turning places. *Left lane*: outside of junctions a wheel stands more than 5 cm outside of the ego's lane and
+    those beside it in the same direction. *Left road*: the middle of the ego and a wheel are off everything that is paved.
+    *Wrong way*: outside of junctions the middle of the moving ego has been for half a second on a lane that runs against it and
+    on none that runs with it. *Red light*: the front bumper passes the end of a lane whose signal for the way taken is red,
+    before and after the step; yellow is none. *Right of way*: the front bumper enters a junction and a vehicle that the ego had
+    to let pass, on a way that crosses or meets the ego's, would be there within 2 s at its present speed or is in the first
+    half of its way through; or such a vehicle brakes with more than 4 m/s^2 while the ego is in the junction. *Put back*: SUMO
+    had taken the ego off the road. What has not been seen for a second is over; if it comes again, it is a new event.
     """
 
     def __init__(self, rights: Rights) -> None:

@@ -29,7 +29,7 @@ class Footing:
             is on the lane's strip, since SUMO goes by the nearest lane; else where it really is.
         strip_outside_m: how far the worst wheel is outside of the strips of these two lanes, also in junctions.
         against: the middle lies on a lane that runs against the ego and on none that runs with it.
-        off_road: the middle lies on nothing that is paved for cars.
+        off_road: the middle lies on nothing that is paved for cars, and so does a wheel: seams between lanes are no edge.
     """
 
     lane: int
@@ -87,7 +87,7 @@ def stand(ground: Ground, pose_m: tuple[float, float, float], lane: int, front_l
         strip_outside_m=float(beyond[WHEELS][:, [rear, front]].min(axis=1).max()) if rear >= 0 and front >= 0 else FAR_OFF_M,
         in_junction=inside,
         against=_runs_against(ground, near, heading),
-        off_road=bool(off[MIDDLE] > 0.0),
+        off_road=bool(off[MIDDLE] > 0.0 and off[WHEELS].any()),
     )
 
 

@@ -8,9 +8,10 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
+from hippodrome.core.navigation.spaces import Action, Observed
 from hippodrome.core.types import HippodromeError
 from hippodrome.sim.ego import MAX_ACCEL_MPS2, MAX_BRAKE_MPS2, MAX_STEERING_RAD
-from hippodrome.sim.loop.env import Action, Observed, TownEnv
+from hippodrome.sim.loop.env import TownEnv
 
 
 class SiUnits(gymnasium.ActionWrapper[Observed, Action, Action]):

@@ -1,17 +1,23 @@
 """Scores by hand: arrivals, false arrivals, SPL, penalties, and the table's width."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from hippodrome.core.navigation.types import DrivingState
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.commands.drive import ROW_KEYS
 from hippodrome.eval.drive.flight import TRACE, Flight
+from hippodrome.eval.drive.foreign import Policy
 from hippodrome.eval.drive.missions import Mission, draw_missions
-from hippodrome.eval.drive.rows import ROWS, row_named
+from hippodrome.eval.drive.rows import ROWS, policy_row, row_named
+from hippodrome.eval.drive.run import with_earlier
 from hippodrome.eval.drive.scoring import DEFINITIONS, mission_result, row_result
 from hippodrome.eval.drive.table import table_lines
-from hippodrome.eval.results.model import Network, Results, Row, ScenarioResult
+from hippodrome.eval.results.model import Network, Results, Row, ScenarioResult, write_results
 from hippodrome.sim.loop.types import Event, EventKind
+from hippodrome.sim.mission_spec import RowKey
 from tests.core.synthetic import grid_network, lanes_of
 
 NETWORK = lanes_of([(0.0, 0.0), (100.0, 0.0)], [(100.0, 0.0), (200.0, 0.0)], successor=[(0, 1)])
@@ -90,3 +96,25 @@ def test_the_table_fits_a_terminal():
 def test_a_row_that_there_is_not_is_refused():
     with pytest.raises(HippodromeError, match="choose from ours"):
         row_named("theirs")
+
+
+def test_rows_have_the_same_keys_everywhere():
+    keys = tuple(row.key for row in ROWS)
+    assert keys == get_args(RowKey) == ROW_KEYS
+    with pytest.raises(HippodromeError, match="a row of ours is called so"):
+        policy_row(Policy("truth", "my_module:Mine"))
+
+
+def test_rows_of_an_evaluation_in_the_same_folder_are_kept(tmp_path):
+    place = {"network": Network(edges=2, km=0.2), "noise": "paper", "frames": 0, "duration_s": 0.0, "configuration": {}}
+    drive = row_result([mission_result(MISSION, flight(), NETWORK, 20.0)], 12.0)
+    mapped, old, new = Row(method="topometric"), Row(method="old", drive=drive), Row(method="ours", drive=drive)
+    earlier, now, other = (
+        Results(scenarios=(ScenarioResult(name="town", seed=seed, rows=rows, **place),))
+        for seed, rows in ((1, (mapped, old)), (1, (new,)), (2, (new,)))
+    )
+    write_results(tmp_path / "results.json", earlier)
+    assert [row.method for row in with_earlier(now, tmp_path / "results.json").scenarios[0].rows] == ["topometric", "ours"]
+    assert with_earlier(other, tmp_path / "results.json") == other
+    (tmp_path / "results.json").write_text("{")
+    assert with_earlier(now, tmp_path / "results.json") == now == with_earlier(now, tmp_path / "absent.json")

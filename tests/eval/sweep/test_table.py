@@ -14,6 +14,7 @@ from hippodrome.eval.sweep.cell import CellResult, Samples
 from hippodrome.eval.sweep.grid import SweepCell
 from hippodrome.eval.sweep.table import pooled_rows, sweep_markdown
 from hippodrome.sim.scenario import Scenario
+from tests.eval.drive.samples import MISSION, drive_figures
 
 
 def finished(seed, errors_m, failure=None, noise="paper"):
@@ -47,3 +48,17 @@ def test_a_row_for_each_setting_and_a_list_of_what_has_no_result():
     assert "| noise=paper | ours | 1 | 0 | 1.00 | 1.00 | 1.00 | 1.00 | 1.00 (town, seed 1) |" in text
     assert "| noise=harsh | ours | 1 | 1 | - | - | - | - | - |" in text
     assert "- town, seed 3, noise=paper: KeyError: 'x'" in text
+
+
+def test_missions_of_a_setting_are_pooled_in_a_table_of_their_own():
+    rows = {}
+    for seed, success in ((1, True), (2, False)):
+        cell = SweepCell(Scenario(name="town", seed=seed), ())
+        drive = drive_figures(missions_detail=[{**MISSION, "success": success, "events": {"wrong way": 2}}])
+        result = ScenarioResult(name="town", seed=seed, network=Network(edges=1, km=1.0), noise="paper", frames=0, duration_s=0.0,
+                                rows=(Row(method="ours", drive=drive),))  # fmt: skip
+        rows[cell] = CellResult(parameters={}, result=result, samples={})
+    (pooled,) = pooled_rows(rows)
+    assert pooled["drive"]["missions"] == 2 and pooled["drive"]["success_rate"] == 0.5 and pooled["drive"]["wrong_way"] == 4
+    text = sweep_markdown([pooled], [])
+    assert "| as written | ours | 2 | 2 | 50 |" in text and "APE" not in text

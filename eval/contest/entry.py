@@ -16,7 +16,7 @@ from hippodrome.eval.contest.loading import load_class, made_of, require_config
 from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, stem_of
 from hippodrome.eval.methods.ours import DeadReckoning, SemiMetric, Topometric, TopometricPaper
 from hippodrome.eval.methods.protocol import Describes, Localizes, Maps, MethodError, Needs
-from hippodrome.eval.programs.process import can_conceal
+from hippodrome.eval.programs.containment import can_contain
 from hippodrome.eval.programs.program import ProgramLocalizer, ProgramMapper
 from hippodrome.eval.programs.stream import StreamLocalizer, StreamMapper
 from hippodrome.eval.results.model import Declaration
@@ -53,7 +53,7 @@ class Entry:
         """What its row says of it."""
         base = f"the map of {self.builds_on}, " if self.builds_on is not None and self.source != "hippodrome" else ""
         return Declaration(
-            frame=self.method.frame, given=base + self.needs.in_words(), source=self.source, isolated=self.apart and can_conceal()
+            frame=self.method.frame, given=base + self.needs.in_words(), source=self.source, isolated=self.apart and can_contain()
         )
 
     @property

@@ -6,6 +6,7 @@ import argparse
 import inspect
 import math
 import os
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -166,9 +167,17 @@ def positive(text: str) -> int:
 
 def positive_number(text: str) -> float:
     """A finite number above 0."""
-    value = float(text)
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return number_within(text, math.ulp(0.0), sys.float_info.max, "not a number above 0")
+
+
+def number_within(text: str, least: float, most: float, what: str) -> float:
+    """A number from ``least`` to ``most``. Raises ArgumentTypeError, which says that the text is ``what``."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not least <= value <= most:
+        raise argparse.ArgumentTypeError(f"'{text}' is {what}")
     return value
 
 
@@ -240,21 +249,9 @@ def units(text: str) -> float:
     """``metres``, or how many of them a unit of the odometry has."""
     if text == "metres":
         return 1.0
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 1e-6 <= value <= 1e6:
-        raise argparse.ArgumentTypeError(f"'{text}' is neither metres nor a number of metres from 1e-6 to 1e6")
-    return value
+    return number_within(text, 1e-6, 1e6, "neither metres nor a number of metres from 1e-6 to 1e6")
 
 
 def accuracy_m(text: str) -> float:
     """Metres from 0 on, below the width of a town."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value <= 100.0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number of metres from 0 to 100")
-    return value
+    return number_within(text, 0.0, 100.0, "not a number of metres from 0 to 100")

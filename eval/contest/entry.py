@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import entry_points
@@ -93,6 +94,12 @@ def parse_method(text: str) -> Added:
     except ValidationError as error:
         raise ValueError(f"'{text}': {error.errors(include_url=False)[0]['msg'].removeprefix('Value error, ')}") from None
     return Added(name or (_program_name(rest) if kind in ("exec", "stream") else None), spec)
+
+
+def as_option(name: str, spec: MethodSpec) -> str:
+    """The option by which the command line adds a method that it has added before."""
+    what = spec.class_ or (f"exec:{spec.command}" if spec.command is not None else f"stream:{spec.stream}")
+    return f"--method {shlex.quote(f'{name}={what}')}"
 
 
 def with_methods(scenario: Scenario, added: Sequence[Added]) -> Scenario:

@@ -302,6 +302,14 @@ def test_a_class_that_is_not_there_is_named(reference, cause):
         load_class(reference)
 
 
+@pytest.mark.parametrize("text", ["raise SystemExit(0)", "raise BaseException", "import", "1 / 0"])
+def test_a_module_that_cannot_be_imported_is_a_sentence(tmp_path, text):
+    name = f"script_{abs(hash(text))}"
+    (tmp_path / f"{name}.py").write_text(text)
+    with pytest.raises(HippodromeError, match=r"importing it failed: .*line 1"):
+        load_class(f"{name}:Mapper")
+
+
 def test_a_class_without_any_of_the_functions_is_refused(materials):
     with pytest.raises(HippodromeError, match="none of the functions map, localize and describe"):
         entries_of(with_methods(materials.scenario, [parse_method("entrants:Empty")]))

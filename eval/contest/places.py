@@ -45,16 +45,23 @@ def _described(
     steps = drive.samples.frame_steps
     stretch = np.floor(path_length_m(drive.samples.poses_m)[steps] / spacing_m)
     chosen = steps[np.concatenate([[True], np.diff(stretch) > 0])]
-    vectors, took_s = [], []
+    vectors: list[FloatArray] = []
+    took_s = []
     for step in chosen:
         frame = drive.frame(int(drive.samples.frame[step]))
         began = perf_counter()
         vector = describe(frame)
         took_s.append(perf_counter() - began)
-        vectors.append(numbers(vector, f"{label}: describe()'s vector").ravel())
-        if len(vectors[-1]) != len(vectors[0]) or len(vectors[0]) == 0:
-            sizes = f"{len(vectors[-1])} numbers, {len(vectors[0])} at first"
-            raise MethodError(f"{label}: describe() gave {sizes}; as many are expected for every frame, one at least")
-        if not (np.abs(vectors[-1]) <= MAX_NUMBER).all():
-            raise MethodError(f"{label}: describe() gave a number that is not finite, or beyond {MAX_NUMBER:g}")
+        vectors.append(vector_of(vector, vectors[0] if vectors else None, label))
     return np.array(vectors), drive.samples.poses_m[chosen], np.array(took_s)
+
+
+def vector_of(given: Any, first: FloatArray | None, label: str) -> FloatArray:
+    """What ``describe`` gave, as a vector (D,) as long as the ``first`` one. Raises MethodError if it is none."""
+    vector = numbers(given, f"{label}: describe()'s vector").ravel()
+    if len(vector) == 0 or (first is not None and len(vector) != len(first)):
+        sizes = f"{len(vector)} numbers" + ("" if first is None else f", {len(first)} at first")
+        raise MethodError(f"{label}: describe() gave {sizes}; as many are expected for every frame, one at least")
+    if not (np.abs(vector) <= MAX_NUMBER).all():
+        raise MethodError(f"{label}: describe() gave a number that is not finite, or beyond {MAX_NUMBER:g}")
+    return vector

@@ -9,6 +9,8 @@ import pytest
 from hippodrome.eval.contest.entry import parse_method, with_methods
 from hippodrome.eval.contest.trials import localize_added
 from hippodrome.eval.methods.materials import gather
+from hippodrome.eval.trials.robustness.methods import left_out
+from hippodrome.eval.trials.robustness.tables import yardsticks_markdown
 from hippodrome.eval.trials.stress.cases import StressCase
 from hippodrome.eval.trials.stress.run import StressTask, applicable
 from hippodrome.eval.trials.stress.table import stress_markdown
@@ -93,6 +95,14 @@ def test_the_command_that_reruns_a_row_has_the_method_with_it(text, tmp_path):
     assert parse_method(words[words.index("--method") + 1]) == added
     assert "--method" not in task.rerun(StressCase("paper"), "kept")
     assert "--method" not in task.rerun(StressCase("paper"))
+
+
+def test_a_method_that_failed_or_has_nothing_to_do_is_named_in_the_table_of_robustness():
+    scenario = Scenario(name="town", methods={"mapper": {"command": "./run.sh {sequence} {out}"}})
+    text = yardsticks_markdown([], {"broken": "no idea", **left_out(scenario)})
+    assert "| broken | - |" in text
+    assert "- broken: no idea" in text
+    assert "- mapper: left out: it neither localizes nor describes views" in text
 
 
 def test_false_closures_are_errors_of_our_own_map():

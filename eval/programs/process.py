@@ -62,7 +62,7 @@ class Process:
     log: Path  # what it prints, on standard error at least
     began_s: float = field(default_factory=time.monotonic)
     cpu_s: float = 0.0  # user and system time of it and of the processes that it waited for
-    peak_rss_bytes: int = 0
+    peak_rss_bytes: int | None = None  # None: it ended before it was seen
     status: int | None = None
     stopped: str | None = None  # why it was stopped, if it was
     stalled: bool = False  # whether it was stopped because it did no work
@@ -126,9 +126,11 @@ class Process:
         held, processes = 0, _processes()
         for pid in _family(self.popen.pid, processes):
             held += processes[pid].held_bytes
+            if self.contained and self.popen.pid in (pid, processes[pid].parent):
+                continue  # the process that was started and its shell lead to the program and are not part of it
             with contextlib.suppress(OSError, ValueError, IndexError):
                 peak = 1024 * int(Path(f"/proc/{pid}/status").read_text().split("VmHWM:")[1].split()[0])
-                self.peak_rss_bytes = max(peak, self.peak_rss_bytes)
+                self.peak_rss_bytes = max(peak, self.peak_rss_bytes or 0)
         return held
 
     def stop(self, cause: str) -> None:

@@ -48,7 +48,7 @@ def python(text):
 
 @pytest.mark.parametrize("layout", ["tum", "euroc", "kitti", "rosbag2", "mcap"])
 def test_a_program_has_a_row_with_errors_and_costs(row, layout):
-    found = row(python(INTEGRATE), input=layout)
+    found = row(python(f"{INTEGRATE}import time\ntime.sleep(0.2)\n"), input=layout)  # long enough to be seen
     assert found.failure is None
     assert found.ape.mean_m < 1.0
     assert found.cpu_percent > 0.0

@@ -6,6 +6,7 @@ import argparse
 import inspect
 import math
 import os
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -185,19 +186,19 @@ def positive(text: str) -> int:
     return value
 
 
-def number_or_nan(text: str) -> float:
-    """The number that a text is; nan, which lies within no limits, where it is none."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
 def positive_number(text: str) -> float:
     """A finite number above 0."""
-    value = float(text)
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return number_within(text, math.ulp(0.0), sys.float_info.max, "not a number above 0")
+
+
+def number_within(text: str, least: float, most: float, what: str) -> float:
+    """A number from ``least`` to ``most``. Raises ArgumentTypeError, which says that the text is ``what``."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not least <= value <= most:
+        raise argparse.ArgumentTypeError(f"'{text}' is {what}")
     return value
 
 
@@ -269,15 +270,9 @@ def units(text: str) -> float:
     """``metres``, or how many of them a unit of the odometry has."""
     if text == "metres":
         return 1.0
-    value = number_or_nan(text)
-    if not 1e-6 <= value <= 1e6:
-        raise argparse.ArgumentTypeError(f"'{text}' is neither metres nor a number of metres from 1e-6 to 1e6")
-    return value
+    return number_within(text, 1e-6, 1e6, "neither metres nor a number of metres from 1e-6 to 1e6")
 
 
 def accuracy_m(text: str) -> float:
     """Metres from 0 on, below the width of a town."""
-    value = number_or_nan(text)
-    if not 0.0 <= value <= 100.0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number of metres from 0 to 100")
-    return value
+    return number_within(text, 0.0, 100.0, "not a number of metres from 0 to 100")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hippodrome.eval.commands.arguments import number_or_nan
+from hippodrome.eval.commands.arguments import number_within, positive_number
 
 
 def add_truth(parser: argparse.ArgumentParser, default: str) -> None:
@@ -21,27 +21,14 @@ def add_truth(parser: argparse.ArgumentParser, default: str) -> None:
              "plane of their own)",
     )  # fmt: skip
     parser.add_argument(
-        "--truth-sigma", type=above_zero, metavar="M",
+        "--truth-sigma", type=positive_number, metavar="M",
         help="accuracy of the truth: standard deviation along one axis, metres (default: as the file says)",
     )  # fmt: skip
 
 
-def above_zero(text: str) -> float:
-    """A finite number above 0."""
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
-    return value
-
-
 def offset(text: str) -> float | str:
     """Seconds to add to a clock, or ``auto``."""
-    if text == "auto":
-        return text
-    value = number_or_nan(text)
-    if not abs(value) <= 1e11:
-        raise argparse.ArgumentTypeError(f"'{text}' is neither auto nor a number of seconds")
-    return value
+    return text if text == "auto" else number_within(text, -1e11, 1e11, "neither auto nor a number of seconds")
 
 
 def ahead(text: str) -> float | str:
@@ -51,18 +38,12 @@ def ahead(text: str) -> float | str:
 
 def metres_ahead(text: str, or_else: str = "") -> float:
     """Metres ahead of the rear axle; ``or_else`` is what an option takes as well."""
-    value = number_or_nan(text)
-    if not abs(value) <= 1e4:
-        raise argparse.ArgumentTypeError(f"'{text}' is not {or_else}a number from -10000 to 10000")
-    return value
+    return number_within(text, -1e4, 1e4, f"not {or_else}a number from -10000 to 10000")
 
 
 def rate(text: str) -> float:
     """A rate or a height, from 0.01 to 10000."""
-    value = number_or_nan(text)
-    if not 0.01 <= value <= 10_000.0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0.01 to 10000")
-    return value
+    return number_within(text, 0.01, 10_000.0, "not a number from 0.01 to 10000")
 
 
 def size(text: str) -> tuple[int, int]:

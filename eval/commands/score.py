@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command
-from hippodrome.eval.commands.foreign import above_zero, add_truth, ahead, metres_ahead
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, positive_number
+from hippodrome.eval.commands.foreign import add_truth, ahead, metres_ahead
 
 
 def add_score_command(commands: Any) -> None:
@@ -66,19 +66,22 @@ def add_score_command(commands: Any) -> None:
         "--time-offset", type=float, default=0.0, metavar="S", help="seconds to add to the times of --truth (default: 0)"
     )
     score.add_argument(
-        "--max-gap", type=above_zero, metavar="S",
+        "--max-gap", type=positive_number, metavar="S",
         help="do not interpolate between samples farther apart than this, in seconds (default: 0.25; at sparse truth 1, or "
              "twice the estimate's usual interval)",
     )  # fmt: skip
     score.add_argument("--json", type=Path, metavar="FILE", help="also write the figures into this file (default: none)")
     score.add_argument(
         "--max-ape",
-        type=above_zero,
+        type=positive_number,
         metavar="M",
         help="exit status 1 if the mean of the first APE is larger (default: no limit)",
     )
     score.add_argument(
-        "--max-rpe", type=above_zero, metavar="M", help="exit status 1 if the mean RPE over 20 m is larger (default: no limit)"
+        "--max-rpe",
+        type=positive_number,
+        metavar="M",
+        help="exit status 1 if the mean RPE over 20 m is larger (default: no limit)",
     )
 
 

@@ -16,17 +16,18 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from hippodrome._folders import temporary_folder
 from hippodrome.core.types import FloatArray, Frame, Observation
 from hippodrome.eval.contest.guard import Crashed
-from hippodrome.eval.methods.protocol import Given, Localized, Mapped, MethodError
+from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, MethodError
 from hippodrome.eval.programs.process import POLL_S, Limits, Process, started
 from hippodrome.sim.method_spec import MethodSpec
 
 CHILD: Final = "hippodrome.eval.contest.child"
 LENGTH: Final = struct.Struct("<Q")  # before each message: its length in bytes
+AnswerT = TypeVar("AnswerT", Mapped, Localized)
 LOOK_S: Final = 1.0  # between two looks at what memory it holds
 CHUNK_BYTES: Final = 1 << 20
 
@@ -73,12 +74,18 @@ class Apart:
         return None if self._process is None else self._process.peak_rss_bytes
 
     def _map(self, observations: Iterator[Observation], given: Given) -> Mapped:
-        mapped: Mapped = self._call("map", _sendable(given), observations)
-        return replace(mapped, save=self._save) if mapped.save is not None else mapped
+        made: tuple[Mapped, bool] = self._call("map", _sendable(given), observations)
+        mapped, saves = made
+        return replace(self._measured(mapped), save=self._save if saves else None)
 
     def _localize(self, observations: Iterator[Observation], given: Given) -> Localized:
         localized: Localized = self._call("localize", _sendable(given), observations)
-        return localized
+        return self._measured(localized)
+
+    def _measured(self, answer: AnswerT) -> AnswerT:
+        """An answer with the memory that was seen here; what it says of its cost is looked at later."""
+        cost = answer.cost
+        return replace(answer, cost=replace(cost, peak_rss_bytes=self.peak_rss_bytes)) if isinstance(cost, Cost) else answer
 
     def _describe(self, frame: Frame) -> FloatArray:
         vector: FloatArray = self._call("describe", frame)
@@ -107,8 +114,6 @@ class Apart:
                 self._send(process, pickle.dumps(next(observations, None), pickle.HIGHEST_PROTOCOL))
             elif kind == "done":
                 process.look()
-                if isinstance(value, Mapped | Localized) and value.cost is not None:
-                    return replace(value, cost=replace(value.cost, peak_rss_bytes=process.peak_rss_bytes))
                 return value
             elif kind == "crashed":
                 raise Crashed(*value)
@@ -144,6 +149,8 @@ class Apart:
                 held += data
                 if head and len(held) == wanted:
                     wanted, head = LENGTH.unpack(held)[0], False
+                    if wanted > self._limits.memory_bytes:
+                        raise MethodError("it wrote to a file that it did not open, which is the harness's")
                     held.clear()
                 continue
             now_s = time.monotonic()

@@ -11,6 +11,7 @@ from time import process_time
 import numpy as np
 
 from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, Observation, StartPose, Trajectory
+from hippodrome.eval.contest.answers import sound_cost, sound_estimates, sound_map
 from hippodrome.eval.contest.entry import Entry
 from hippodrome.eval.contest.guard import guarded
 from hippodrome.eval.methods.feed import Feed
@@ -32,7 +33,7 @@ from hippodrome.eval.methods.protocol import (
 from hippodrome.eval.methods.sequences import observations_of, stereo_observations_of
 from hippodrome.eval.methods.stages import Localization
 from hippodrome.eval.metrics.alignment import Transform, apply_to_trajectory, find_alignment
-from hippodrome.eval.metrics.association import associate, check_trajectory
+from hippodrome.eval.metrics.association import associate
 from hippodrome.proto.codec import save_map
 from hippodrome.sim.recording import Recording
 
@@ -91,6 +92,8 @@ def localize(
     feed = Feed(_observations(entry, drive, stretch))
     estimates, cost = guarded(label, lambda: estimates_of(label, entry.runner.localize(iter(feed), given)), materials)
     feed.settle()
+    if entry.source != "hippodrome":
+        estimates, cost = sound_estimates(estimates, label), sound_cost(cost, label)
     estimates = estimates if placed is None else [_moved(estimate, placed) for estimate in estimates]
     times_s = drive.samples.t_s[first:end]
     if len(estimates) != len(times_s):
@@ -160,10 +163,10 @@ def _draw(entry: Entry, materials: Materials, drawn: Mapping[str, Drawn | str], 
     mapped = guarded(label, lambda: as_mapped(entry.runner.map(iter(feed), given), label), materials)
     cpu_s = process_time() - began - feed.decoding_s
     feed.settle()
+    mapped = sound_map(mapped, label)
     peak_rss_bytes = growth.as_if_alone_bytes() if mapped.cost is None else mapped.cost.peak_rss_bytes
     if mapped.cost is None and base is not None and peak_rss_bytes is not None:
         peak_rss_bytes = max(peak_rss_bytes, base.peak_rss_bytes or 0)
-    check_trajectory(mapped.trajectory, label)
     map_bytes = guarded(label, lambda: _save(entry, mapped, materials), materials)
     step_s = feed.step_s
     if (cost := mapped.cost) is not None:

@@ -18,10 +18,14 @@ import numpy as np
 
 from hippodrome.core.types import FloatArray, Frame, HippodromeError, Observation
 from hippodrome.eval.contest.apart import LENGTH, Kept, Made
-from hippodrome.eval.contest.guard import crash_of
+from hippodrome.eval.contest.guard import crash_of, left_by, printable
 from hippodrome.eval.contest.loading import load_class, made_of
 from hippodrome.eval.methods.feed import Feed
-from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, as_estimate, as_mapped
+from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, MethodError, as_estimate, as_mapped
+
+
+class Over(BaseException):
+    """The harness has closed the pipe. It is no Exception, so that no method takes it for one of its own."""
 
 
 class Served:
@@ -33,15 +37,14 @@ class Served:
         self._runner = made_of(load_class(made.spec.class_), made.spec.config, None, made.label)
         self._mapped: Mapped | None = None
 
-    def map(self, given: Given) -> Mapped:
-        """Its map of the observations that it is handed, without what can only live here."""
+    def map(self, given: Given) -> tuple[Mapped, bool]:
+        """Its map of the observations that it is handed, without what can only live here, and whether it can be saved."""
         feed, began = Feed(self._observations()), process_time()
         self._mapped = as_mapped(self._runner.map(iter(feed), given), self._label)
         feed.settle()
         cost = self._mapped.cost or Cost(process_time() - began - feed.decoding_s, None, feed.step_s)
-        save = _can_be_saved if self._mapped.save is not None else None
-        state = self._mapped.state
-        return replace(self._mapped, state=state if _can_be_pickled(state) else Kept(), save=save, cost=cost)
+        state = self._mapped.state if _can_be_pickled(self._mapped.state) else Kept()
+        return replace(self._mapped, state=state, save=None, cost=cost), self._mapped.save is not None
 
     def localize(self, given: Given) -> Localized:
         """Its answers to the observations that it is handed."""
@@ -70,7 +73,10 @@ class Served:
         """Its map in a file; the size in bytes."""
         assert self._mapped is not None
         assert self._mapped.save is not None
-        return self._mapped.save(path)
+        size = self._mapped.save(path)
+        if not isinstance(size, int) or size < 0:
+            raise MethodError(f"{self._label}: save() gave {size!r:.40}; the size of the file in bytes is expected")
+        return size
 
     def _observations(self) -> Iterator[Observation]:
         while True:
@@ -82,24 +88,30 @@ class Served:
 
 
 def request(source: IO[bytes]) -> Any:
-    """The next message of the harness. Raises EOFError when there is none any more."""
+    """The next message of the harness. Raises Over when there is none any more."""
     head = source.read(LENGTH.size)
     if len(head) < LENGTH.size:
-        raise EOFError
+        raise Over
     return pickle.loads(source.read(LENGTH.unpack(head)[0]))
 
 
 def answer(sink: IO[bytes], kind: str, value: Any) -> None:
     """Send one message to the harness."""
-    body = pickle.dumps((kind, value), pickle.HIGHEST_PROTOCOL)
+    try:
+        body = pickle.dumps((kind, value), pickle.HIGHEST_PROTOCOL)
+    except Exception as error:
+        cause = printable(f"what it gave cannot be handed over: {type(error).__name__}: {error}")
+        body = pickle.dumps(("refused", cause), pickle.HIGHEST_PROTOCOL)
     sink.write(LENGTH.pack(len(body)) + body)
     sink.flush()
 
 
 def main() -> None:
     """Serve requests until the harness closes the pipe."""
-    source, sink = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # a method that prints does not break the messages
+    source, sink = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # a method that prints does not break the messages, nor does one that reads
+    with Path(os.devnull).open("rb") as nothing:
+        os.dup2(nothing.fileno(), 0)
     served: Served | None = None
     try:
         made: Made = request(source)
@@ -109,17 +121,17 @@ def main() -> None:
             try:
                 served = served or Served(made, source, sink)
                 value = getattr(served, name)(argument)
-            except EOFError:
+            except Over:
                 raise
             except HippodromeError as error:
                 answer(sink, "refused", str(error))
             except SystemExit as error:
-                answer(sink, "refused", f"it left the process with status {error.code}")
-            except Exception as error:
+                answer(sink, "refused", left_by(error))
+            except BaseException as error:
                 answer(sink, "crashed", crash_of(error))
             else:
                 answer(sink, "done", value)
-    except EOFError:
+    except Over:
         return
 
 
@@ -129,11 +141,6 @@ def _can_be_pickled(state: Any) -> bool:
     except Exception:
         return False
     return True
-
-
-def _can_be_saved(_: Path) -> int:
-    """Stands for a function that stays here; ``apart.py`` asks for it."""
-    raise NotImplementedError
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import entry_points
@@ -16,7 +17,7 @@ from hippodrome.eval.contest.loading import load_class, made_of, require_config
 from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, stem_of
 from hippodrome.eval.methods.ours import DeadReckoning, SemiMetric, Topometric, TopometricPaper
 from hippodrome.eval.methods.protocol import Describes, Localizes, Maps, MethodError, Needs
-from hippodrome.eval.programs.process import can_conceal
+from hippodrome.eval.programs.containment import can_contain
 from hippodrome.eval.programs.program import ProgramLocalizer, ProgramMapper
 from hippodrome.eval.programs.stream import StreamLocalizer, StreamMapper
 from hippodrome.eval.results.model import Declaration
@@ -53,7 +54,7 @@ class Entry:
         """What its row says of it."""
         base = f"the map of {self.builds_on}, " if self.builds_on is not None and self.source != "hippodrome" else ""
         return Declaration(
-            frame=self.method.frame, given=base + self.needs.in_words(), source=self.source, isolated=self.apart and can_conceal()
+            frame=self.method.frame, given=base + self.needs.in_words(), source=self.source, isolated=self.apart and can_contain()
         )
 
     @property
@@ -93,6 +94,12 @@ def parse_method(text: str) -> Added:
     except ValidationError as error:
         raise ValueError(f"'{text}': {error.errors(include_url=False)[0]['msg'].removeprefix('Value error, ')}") from None
     return Added(name or (_program_name(rest) if kind in ("exec", "stream") else None), spec)
+
+
+def as_option(name: str, spec: MethodSpec) -> str:
+    """The option by which the command line adds a method that it has added before."""
+    what = spec.class_ or (f"exec:{spec.command}" if spec.command is not None else f"stream:{spec.stream}")
+    return f"--method {shlex.quote(f'{name}={what}')}"
 
 
 def with_methods(scenario: Scenario, added: Sequence[Added]) -> Scenario:

@@ -35,17 +35,30 @@ def guarded(label: str, function: Callable[[], ResultT], materials: Materials) -
     except SystemExit as error:
         if error.code == INTERRUPTED:
             raise
-        raise MethodError(f"it left the process with status {error.code}") from error
+        raise MethodError(left_by(error)) from error
     except BaseException as error:
         cause, trace = (error.cause, error.trace) if isinstance(error, Crashed) else crash_of(error)
         log = materials.folder / f"{label.replace(' ', '-')}-crash.txt"
-        write_atomically(log, trace.encode())
+        write_atomically(log, trace.encode(errors="replace"))
         raise MethodError(f"{cause}; its traceback is in {log.name}") from error
+
+
+def left_by(error: SystemExit) -> str:
+    """How a method left its process."""
+    return printable(f"it left the process with status {0 if error.code is None else error.code}"[:200])
 
 
 def crash_of(error: BaseException) -> tuple[str, str]:
     """What was raised and where, in one line, and the whole traceback."""
     last = traceback.extract_tb(error.__traceback__)[-1]
-    text = " ".join(str(error).split())[:200]
+    try:
+        text = " ".join(str(error).split())[:200]
+    except Exception:  # its own words may be what is broken
+        text = "it cannot say why"
     trace = "".join(traceback.format_exception(error))
-    return f"crashed: {type(error).__name__}: {text} ({Path(last.filename).name}, line {last.lineno})", trace
+    return printable(f"crashed: {type(error).__name__}: {text} ({Path(last.filename).name}, line {last.lineno})"), trace
+
+
+def printable(text: str) -> str:
+    """A text of others, without what moves a terminal's cursor or cannot be written as UTF-8."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import BaseModel, ValidationError
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.contest.guard import crash_of
 from hippodrome.eval.methods.protocol import MethodError
 
 if TYPE_CHECKING:
@@ -31,8 +32,10 @@ def load_class(reference: str) -> type[Any]:
         ) from None
     except AttributeError:
         raise MethodError(f"method {reference}: the module has no '{class_name}'") from None
-    except Exception as error:
-        raise MethodError(f"method {reference}: importing it failed: {type(error).__name__}: {error}") from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a script that is no module leaves the process when it is imported
+        raise MethodError(f"method {reference}: importing it failed: {_said(error)}") from error
     if not isinstance(found, type):
         raise MethodError(f"method {reference}: '{class_name}' is a {type(found).__name__}, not a class")
     return found
@@ -47,7 +50,12 @@ def made_of(cls: type[Any], config: dict[str, Any], scenario: Scenario | None, l
     except HippodromeError:
         raise
     except Exception as error:
-        raise MethodError(f"method {label}: it cannot be made: {type(error).__name__}: {error}") from error
+        raise MethodError(f"method {label}: it cannot be made: {_said(error)}") from error
+
+
+def _said(error: BaseException) -> str:
+    """What was raised, in one line."""
+    return crash_of(error)[0].removeprefix("crashed: ")
 
 
 def require_config(cls: type[Any], config: dict[str, Any], label: str) -> BaseModel | None:

@@ -73,14 +73,27 @@ def perform(materials: Materials, entries: Sequence[Entry]) -> Performance:
                 unscored += [found] if found is not None else []
                 continue
             try:
-                outcome = _outcome(entry, materials, drawn[entry.method.key], at_s, folders[entry.method.key])
-                said = {"declaration": entry.declaration, "places": _places(entry, materials)}
+                row, outcome = _judged(entry, materials, drawn[entry.method.key], at_s, folders[entry.method.key])
             except HippodromeError as error:
                 rows.append(_failed(entry, drawn, str(error)))
             else:
-                rows.append(row_of(outcome, materials).model_copy(update={**said, **_second_drive(outcome, materials)}))
+                rows.append(row)
                 outcomes.append(outcome)
     return Performance(rows, outcomes, unscored)
+
+
+def _judged(entry: Entry, materials: Materials, drawn: Drawn | str, at_s: FloatArray, folder: Path) -> tuple[Row, Outcome]:
+    """The row of a method, and what it came to. Raises HippodromeError without a trajectory.
+
+    What is odd in an answer of others, and was not seen when it was looked at, falls in its own row and not in the whole run.
+    """
+
+    def judged() -> tuple[Row, Outcome]:
+        outcome = _outcome(entry, materials, drawn, at_s, folder)
+        said = {"declaration": entry.declaration, "places": _places(entry, materials)}
+        return row_of(outcome, materials).model_copy(update={**said, **_second_drive(outcome, materials)}), outcome
+
+    return judged() if entry.source == "hippodrome" else guarded(entry.method.label, judged, materials)
 
 
 def _second_drive(outcome: Outcome, materials: Materials) -> dict[str, Any]:
@@ -226,7 +239,8 @@ def sampled(trajectory: Trajectory, at_s: FloatArray) -> tuple[Trajectory, float
     if covered < LEAST_COVERED or len(within) < 2:
         raise MethodError(
             f"its {len(trajectory.t_s)} poses, from {trajectory.t_s[0]:.1f} s to {trajectory.t_s[-1]:.1f} s, cover {covered:.0%} "
-            f"of the drive, from {at_s[0]:.1f} s to {at_s[-1]:.1f} s; at least {LEAST_COVERED:.0%} is needed"
+            f"of the drive, from {at_s[0]:.1f} s to {at_s[-1]:.1f} s; at least {LEAST_COVERED:.0%} is needed; "
+            "times are those of the observations, in seconds"
         )
     return Trajectory(within, interpolate(trajectory.t_s, trajectory.poses, within)), covered
 

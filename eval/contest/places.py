@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from hippodrome.core.types import FloatArray, Frame
+from hippodrome.eval.contest.answers import numbers
 from hippodrome.eval.methods.materials import Materials
 from hippodrome.eval.methods.protocol import MethodError
 from hippodrome.eval.metrics.places import PlaceScore, score_places
@@ -16,6 +17,7 @@ from hippodrome.eval.metrics.trajectory import path_length_m
 from hippodrome.sim.recording import Recording
 
 PLACE_M: Final = 2.0  # between two frames of the first drive: as dense as a map's views are at most
+MAX_NUMBER: Final = 1e100  # in a vector: the squares of more overflow
 QUERY_M: Final = 5.0  # between two frames of the second drive
 
 
@@ -43,17 +45,23 @@ def _described(
     steps = drive.samples.frame_steps
     stretch = np.floor(path_length_m(drive.samples.poses_m)[steps] / spacing_m)
     chosen = steps[np.concatenate([[True], np.diff(stretch) > 0])]
-    vectors, took_s = [], []
+    vectors: list[FloatArray] = []
+    took_s = []
     for step in chosen:
         frame = drive.frame(int(drive.samples.frame[step]))
         began = perf_counter()
         vector = describe(frame)
         took_s.append(perf_counter() - began)
-        try:
-            vectors.append(np.asarray(vector, dtype=np.float64).ravel())
-        except (TypeError, ValueError) as error:
-            raise MethodError(f"{label}: describe() gave no vector of numbers ({error})") from None
-        if len(vectors[-1]) != len(vectors[0]) or not np.isfinite(vectors[-1]).all():
-            sizes = f"{len(vectors[-1])} numbers, {len(vectors[0])} at first"
-            raise MethodError(f"{label}: describe() gave {sizes}; as many are expected for every frame, all of them finite")
+        vectors.append(vector_of(vector, vectors[0] if vectors else None, label))
     return np.array(vectors), drive.samples.poses_m[chosen], np.array(took_s)
+
+
+def vector_of(given: Any, first: FloatArray | None, label: str) -> FloatArray:
+    """What ``describe`` gave, as a vector (D,) as long as the ``first`` one. Raises MethodError if it is none."""
+    vector = numbers(given, f"{label}: describe()'s vector").ravel()
+    if len(vector) == 0 or (first is not None and len(vector) != len(first)):
+        sizes = f"{len(vector)} numbers" + ("" if first is None else f", {len(first)} at first")
+        raise MethodError(f"{label}: describe() gave {sizes}; as many are expected for every frame, one at least")
+    if not (np.abs(vector) <= MAX_NUMBER).all():
+        raise MethodError(f"{label}: describe() gave a number that is not finite, or beyond {MAX_NUMBER:g}")
+    return vector

@@ -13,6 +13,7 @@ from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.metrics.association import TrajectoryError, check_trajectory
 
 MAX_BYTES = 256 << 20  # about two million poses
+MAX_LINES: Final = 4_000_000  # a line of one letter takes fifty times its bytes of memory
 COLUMNS = 8
 FLAGS: Final = {"1": True, "0": False, "true": True, "false": False, "True": True, "False": False}
 HEAD = "# t_s x y z qx qy qz qw"  # the first line of what we write: its times are the recording's, not those of a foreign drive
@@ -64,13 +65,21 @@ def read_tum_declared(path: Path) -> tuple[Trajectory, NDArray[np.bool_]] | None
 
 def _lines(path: Path) -> list[tuple[int, str]]:
     """The lines with poses and their numbers. Raises TrajectoryError."""
+    lines = read_lines(path)
+    return [(number, one) for number, one in enumerate(lines, start=1) if one.strip() and not one.lstrip().startswith("#")]
+
+
+def read_lines(path: Path) -> list[str]:
+    """All lines of a file of poses, which is not read if it is too long. Raises TrajectoryError."""
     try:
         if (size := path.stat().st_size) > MAX_BYTES:
             raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        data = path.read_bytes()
+        if (count := data.count(b"\n")) > MAX_LINES:
+            raise TrajectoryError(f"{path}: {count} lines, the limit is {MAX_LINES}")
+        return data.decode("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise TrajectoryError(f"{path}: cannot be read as text: {error}") from error
-    return [(number, one) for number, one in enumerate(lines, start=1) if one.strip() and not one.lstrip().startswith("#")]
 
 
 def _time(path: Path, number: int, line: str) -> float:

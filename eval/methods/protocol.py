@@ -170,6 +170,8 @@ class Describes(Protocol):
 def as_mapped(answer: Mapping, label: str) -> Mapped:
     """What ``map`` returned, as one kind of object. Raises MethodError if it is nothing of the kind."""
     if isinstance(answer, Mapped):
+        if answer.save is not None and not callable(answer.save):
+            raise MethodError(f"{label}: its save is a {type(answer.save).__name__}, not a function")
         return answer
     if isinstance(answer, Trajectory):
         return Mapped(answer)
@@ -195,10 +197,14 @@ def as_estimate(answer: Answer | LocalizationEstimate, label: str) -> Localizati
         return answer
     if not isinstance(answer, Answer):
         raise MethodError(f"{label}: localize() gave a {type(answer).__name__}; yield one Answer per observation")
-    pose = np.array([answer.x_m, answer.y_m, answer.heading_rad], dtype=np.float64)
-    if answer.localized and not np.isfinite(pose).all():
+    try:
+        pose = np.array([answer.x_m, answer.y_m, answer.heading_rad], dtype=np.float64)
+        covariance = np.zeros((3, 3)) if answer.covariance is None else np.asarray(answer.covariance, dtype=np.float64)
+        stands_by_it = bool(answer.localized)
+    except (TypeError, ValueError) as error:
+        raise MethodError(f"{label}: localize() gave an Answer that is not made of numbers: {error}") from None
+    if stands_by_it and not np.isfinite(pose).all():
         raise MethodError(f"{label}: localize() stands by a pose that is not finite, at t_s={answer.t_s}")
-    covariance = np.zeros((3, 3)) if answer.covariance is None else np.asarray(answer.covariance, dtype=np.float64)
     nothing = np.zeros((0, 2, 2))
     return LocalizationEstimate(
         t_s=answer.t_s,

@@ -13,6 +13,7 @@ from hippodrome.core.types import FloatArray, HippodromeError, IntArray, Traject
 # Reference samples farther apart than this are not interpolated. Ground truth comes at the camera's rate, 5 to 12 Hz; at 15 m/s a
 # chord over 0.25 s leaves a curve by less than 0.1 m.
 MAX_GAP_S = 0.25
+MAX_COORDINATE = 1e12  # of a pose, in metres or radians: nothing on Earth is farther, and the squares of more overflow
 MIN_COVERAGE = 0.95  # least share of the estimated samples that must have ground truth for a score to be one of the whole drive
 
 
@@ -93,7 +94,7 @@ def associate_at_reference(
 
 
 def check_trajectory(trajectory: Trajectory, name: str) -> None:
-    """Raise TrajectoryError unless the shapes agree, there are samples, all values are finite and times increase.
+    """Raise TrajectoryError unless the shapes agree, there are samples, all are finite poses and times increase.
 
     Args:
         trajectory: The trajectory.
@@ -107,6 +108,8 @@ def check_trajectory(trajectory: Trajectory, name: str) -> None:
     if not (np.isfinite(t_s).all() and np.isfinite(poses).all()):
         bad = int(np.flatnonzero(~(np.isfinite(t_s) & np.isfinite(poses).all(axis=1)))[0])
         raise TrajectoryError(f"{name}: sample {bad} is not finite")
+    if (far := np.abs(poses).max(axis=1) > MAX_COORDINATE).any():
+        raise TrajectoryError(f"{name}: sample {int(np.flatnonzero(far)[0])} is beyond {MAX_COORDINATE:g}, which no pose is")
     if (np.diff(t_s) <= 0.0).any():
         bad = int(np.flatnonzero(np.diff(t_s) <= 0.0)[0]) + 1
         raise TrajectoryError(f"{name}: time {t_s[bad]} of sample {bad} does not increase; sort the samples, drop duplicates")

@@ -8,6 +8,7 @@ import numpy as np
 
 from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
+from hippodrome.eval.files.trajectories import read_lines
 from hippodrome.eval.metrics.association import check_trajectory
 
 COLUMNS = 8  # t x y z qx qy qz qw
@@ -26,9 +27,9 @@ def read_camera_tum(path: Path, forward_m: float) -> Trajectory:
         HippodromeError: The file is no trajectory.
     """
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = read_lines(path)
         table = np.array([[float(word) for word in line.split()] for line in lines if line.strip()], dtype=np.float64)
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         raise HippodromeError(f"{path}: not a trajectory: {error}") from None
     if table.ndim != 2 or table.shape[1] != COLUMNS:
         raise HippodromeError(f"{path}: no poses, or not {COLUMNS} columns a line (t x y z qx qy qz qw)")

@@ -10,15 +10,15 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import IO, Final
 
 from hippodrome._processes import dying_with_me
 from hippodrome.eval.methods.protocol import MethodError
+from hippodrome.eval.programs.containment import DEPTH, can_contain, contained
 from hippodrome.sim.method_spec import MethodSpec
 
 MEGABYTE: Final = 1_000_000
@@ -29,6 +29,7 @@ LAST_WORDS: Final = 300  # characters of what a program printed last that an err
 LEAST_WORK: Final = 0.02  # share of a core: a program that uses less of one for longer than its limit has stalled
 # Signals by which a program ends through a fault of its own. Not SIGKILL, by which the system ends it for want of memory.
 OWN_FAULTS: Final = {signal.SIGABRT, signal.SIGSEGV, signal.SIGFPE, signal.SIGBUS, signal.SIGILL}
+SHELL_SIGNAL: Final = 128  # a shell's status for a command that a signal ended is this and the signal's number
 CPU_CLOCK: Final = 2  # Linux: the low bits of the number of a process's clock of CPU time, all its threads together
 
 
@@ -61,10 +62,12 @@ class Process:
     log: Path  # what it prints, on standard error at least
     began_s: float = field(default_factory=time.monotonic)
     cpu_s: float = 0.0  # user and system time of it and of the processes that it waited for
-    peak_rss_bytes: int = 0
+    peak_rss_bytes: int | None = None  # None: it ended before it was seen
     status: int | None = None
     stopped: str | None = None  # why it was stopped, if it was
     stalled: bool = False  # whether it was stopped because it did no work
+    contained: bool = False  # whether it runs in namespaces, as a grandchild of the process that was started
+    program: int | None = None  # number of its process, once that is known
     marked: tuple[float, float] | None = None  # when its work was looked at last, and the CPU time that it had taken by then
 
     @property
@@ -91,10 +94,22 @@ class Process:
 
     def cpu_now_s(self) -> float:
         """CPU time that it has taken so far, all its threads; the processes that it started are not counted until they end."""
+        if self.program is None:
+            self.program = self._find() if self.contained else self.popen.pid
         try:
-            return time.clock_gettime((~self.popen.pid << 3) | CPU_CLOCK)
+            return 0.0 if self.program is None else time.clock_gettime((~self.program << 3) | CPU_CLOCK)
         except OSError:  # it has just ended
             return self.cpu_s
+
+    def _find(self) -> int | None:
+        """The number of the program's own process; None while it is not there yet."""
+        found, family = self.popen.pid, _processes()
+        for _ in range(DEPTH):
+            children = [pid for pid, one in family.items() if one.parent == found]
+            if not children:
+                return None
+            found = min(children)
+        return found
 
     def _stalls(self, limit_s: float) -> bool:
         """Whether it has done no work for longer than ``limit_s``."""
@@ -104,25 +119,27 @@ class Process:
         return now_s - self.marked[0] > limit_s
 
     def look(self) -> int:
-        """Memory [bytes] that it and the processes of its group hold together now; the most that one of them held is remembered.
+        """Memory [bytes] that it and its family hold together now; the most that one of them held is remembered.
 
         The kernel's figure for a process that has ended (``ru_maxrss``) begins with the memory of the one that started it.
         """
-        held = 0
-        for entry in Path("/proc").iterdir():
-            if entry.name.isdigit():
-                with contextlib.suppress(OSError, ValueError, IndexError):
-                    fields = (entry / "stat").read_text().rpartition(")")[2].split()
-                    if int(fields[2]) == self.popen.pid:
-                        held += int(fields[21]) * resource.getpagesize()
-                        peak = 1024 * int((entry / "status").read_text().split("VmHWM:")[1].split()[0])
-                        self.peak_rss_bytes = max(peak, self.peak_rss_bytes)
+        held, processes = 0, _processes()
+        for pid in _family(self.popen.pid, processes):
+            held += processes[pid].held_bytes
+            if self.contained and self.popen.pid in (pid, processes[pid].parent):
+                continue  # the process that was started and its shell lead to the program and are not part of it
+            with contextlib.suppress(OSError, ValueError, IndexError):
+                peak = 1024 * int(Path(f"/proc/{pid}/status").read_text().split("VmHWM:")[1].split()[0])
+                self.peak_rss_bytes = max(peak, self.peak_rss_bytes or 0)
         return held
 
     def stop(self, cause: str) -> None:
-        """End it and all processes of its group, and remember why."""
+        """End it and its family, and remember why."""
         if self.status is None:
             self.stopped = cause
+            for pid in _family(self.popen.pid, _processes()):
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.kill(pid, signal.SIGKILL)
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self.popen.pid, signal.SIGKILL)
             _, status, usage = os.wait4(self.popen.pid, 0)
@@ -156,7 +173,9 @@ class Process:
         return f"{how}; its last words: {last_words(self.log)}"
 
     def _ended(self, status: int, usage: resource.struct_rusage) -> None:
-        self.status = self.popen.returncode = os.waitstatus_to_exitcode(status)
+        self.popen.returncode = self.status = os.waitstatus_to_exitcode(status)
+        if self.contained and SHELL_SIGNAL < self.status <= SHELL_SIGNAL + signal.SIGRTMAX:
+            self.status = SHELL_SIGNAL - self.status  # its shell says so where a signal ended it
         self.cpu_s = usage.ru_utime + usage.ru_stime
         with contextlib.suppress(ProcessLookupError, PermissionError):  # what it left behind
             os.killpg(self.popen.pid, signal.SIGKILL)
@@ -183,7 +202,9 @@ def started(
     with log.open("ab") as stream:
         if shutil.which(command[0]) is None:
             raise MethodError(f"there is no program '{command[0]}', or it may not be run; name it by a path, and chmod +x it")
-        words = _concealing(concealed) + [str(word) for word in command]
+        words, within = [str(word) for word in command], can_contain()
+        if within:
+            words = contained(words, concealed, limits.memory_bytes, FILE_BYTES)
         try:
             popen = subprocess.Popen(
                 words, stdin=pipe, stdout=subprocess.PIPE if fed else stream, stderr=stream, start_new_session=True,
@@ -192,8 +213,9 @@ def started(
         except OSError as error:
             cure = "does it begin with #! and its interpreter?"
             raise MethodError(f"'{command[0]}' cannot be started: {error.strerror}; {cure}") from None
-    _limit(popen.pid, limits)
-    process = Process(popen, limits, log)
+    if not within:
+        _limit(popen.pid, limits)
+    process = Process(popen, limits, log, contained=within)
     process.look()
     try:
         yield process
@@ -201,6 +223,34 @@ def started(
         process.stop("ended with the evaluation")
         for end in (popen.stdin, popen.stdout):
             _close(end)
+
+
+@dataclass(frozen=True, slots=True)
+class _Running:
+    """A process of the system."""
+
+    parent: int
+    group: int
+    held_bytes: int
+
+
+def _processes() -> dict[int, _Running]:
+    """All processes, by their numbers."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with contextlib.suppress(OSError, ValueError, IndexError):
+                fields = (entry / "stat").read_text().rpartition(")")[2].split()
+                found[int(entry.name)] = _Running(int(fields[1]), int(fields[2]), int(fields[21]) * resource.getpagesize())
+    return found
+
+
+def _family(head: int, processes: Mapping[int, _Running]) -> set[int]:
+    """The process ``head``, those of its group, and all that descend from them."""
+    found = {pid for pid, one in processes.items() if pid == head or one.group == head}
+    while more := {pid for pid, one in processes.items() if one.parent in found} - found:
+        found |= more
+    return found
 
 
 def command_words(text: str, **places: Path) -> list[str]:
@@ -218,34 +268,13 @@ def command_words(text: str, **places: Path) -> list[str]:
 
 def last_words(log: Path) -> str:
     """The last line that a program printed, shortened."""
-    with log.open("rb") as stream:
+    lines = []
+    with contextlib.suppress(OSError), log.open("rb") as stream:  # it may have taken the file away
         stream.seek(0, os.SEEK_END)
         stream.seek(max(stream.tell() - 4096, 0))
         lines = stream.read().decode(errors="replace").splitlines()
     found = next((line.strip() for line in reversed(lines) if line.strip()), "none")
     return "".join(letter if letter.isprintable() else "?" for letter in found)[:LAST_WORDS]
-
-
-@cache
-def can_conceal() -> bool:
-    """Whether this system lets a program have a mount namespace of its own, in which folders can be covered."""
-    if shutil.which("unshare") is None or shutil.which("mount") is None:
-        return False
-    trial = ["unshare", "--user", "--map-root-user", "--mount", "mount", "-t", "tmpfs", "none", "/tmp"]
-    try:
-        return subprocess.run(trial, capture_output=True, timeout=10.0, check=False).returncode == 0
-    except (OSError, subprocess.TimeoutExpired):
-        return False
-
-
-def _concealing(folders: Sequence[Path]) -> list[str]:
-    """Words before a command by which it finds these folders empty."""
-    if not folders or not can_conceal():
-        return []
-    cover = 'mount -t tmpfs -o size=4k none "$1" || exit 125'
-    script = f'n=$1; shift; while [ "$n" -gt 0 ]; do {cover}; shift; n=$((n-1)); done; exec "$@"'
-    covered = [str(folder.resolve()) for folder in folders]
-    return ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", script, "sh", str(len(covered)), *covered]
 
 
 def _limit(pid: int, limits: Limits) -> None:

@@ -71,8 +71,10 @@ def read_answer(out: Path, process: Process, camera_ahead_m: float | None = None
         camera_ahead_m: How far ahead of the rear axle the camera sits whose poses it left; None: it left the axle's.
     """
     path = out / TRAJECTORY
+    if path.resolve() != out.parent.resolve() / out.name / TRAJECTORY:
+        raise MethodError(f"it left {TRAJECTORY} as a link, which is not followed: what it leads to need not be its own")
     if not path.is_file():
-        left = ", ".join(sorted(entry.name for entry in out.iterdir())[:5]) or "nothing"
+        left = ", ".join(sorted(entry.name for entry in out.iterdir())[:5] if out.is_dir() else ()) or "nothing"
         raise MethodError(
             f"it ended with status 0 and left no {TRAJECTORY} in {{out}}, but {left}; its last words: {last_words(process.log)}"
         )

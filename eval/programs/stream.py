@@ -83,7 +83,7 @@ class StreamLocalizer(StreamMapper):
         """Its answers to the observations of the second drive."""
         assert self._spec.localize is not None
         times_s, answers, _, cost = self._run(self._spec.localize, pb.Begin.LOCALIZE, observations, given)
-        return Localized([_answer(t_s, answer) for t_s, answer in zip(times_s, answers, strict=True)], cost)
+        return Localized([answer_of(t_s, answer) for t_s, answer in zip(times_s, answers, strict=True)], cost)
 
 
 def _on_the_way(times_s: list[float], answers: list[pb.Answer]) -> Trajectory | None:
@@ -249,6 +249,9 @@ def _pose(pose: pb.Pose) -> tuple[float, float, float]:
     return pose.x, pose.y, pose.heading_rad
 
 
-def _answer(t_s: float, answer: pb.Answer) -> Answer:
-    covariance = np.array(answer.covariance).reshape(3, 3) if len(answer.covariance) == 9 else None
+def answer_of(t_s: float, answer: pb.Answer) -> Answer:
+    """An answer of the stream as one of the protocol. Raises MethodError if it is none."""
+    if (count := len(answer.covariance)) not in (0, 9):
+        raise MethodError(f"its answer at t_s={t_s:g} has a covariance of {count} numbers; 9 are expected, or none")
+    covariance = np.array(answer.covariance).reshape(3, 3) if answer.covariance else None
     return Answer(t_s, *_pose(answer.pose), localized=answer.known, covariance=covariance)

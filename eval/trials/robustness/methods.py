@@ -13,6 +13,7 @@ import numpy as np
 from hippodrome.core.types import CognitiveMap, FloatArray, Frame, HippodromeError, Trajectory
 from hippodrome.eval.contest.entry import Entry
 from hippodrome.eval.contest.guard import guarded
+from hippodrome.eval.contest.places import vector_of
 from hippodrome.eval.contest.trials import Localizer, added_methods, localizer_of
 from hippodrome.eval.methods.materials import Materials, gather
 from hippodrome.eval.methods.protocol import MethodError
@@ -55,6 +56,13 @@ class Tried:
 def localizing(scenario: Scenario) -> list[str]:
     """Labels of the methods beside ours that localize."""
     return [entry.method.label for entry in added_methods(scenario, "localize")]
+
+
+def left_out(scenario: Scenario) -> dict[str, str]:
+    """Labels of the methods beside ours that have nothing to do here, and why."""
+    mapping = {entry.method.label: entry.does for entry in added_methods(scenario, "map")}
+    why = "left out: it neither localizes nor describes views"
+    return {label: why for label, does in mapping.items() if "localize" not in does and "describe" not in does}
 
 
 def try_method(task: MethodTask) -> Tried:
@@ -106,9 +114,9 @@ def _described(entry: Entry, frames: Sequence[Frame], places_m: FloatArray, quer
 
 
 def _vectors(label: str, entry: Entry, frames: Sequence[Frame]) -> FloatArray:
-    vectors = [np.asarray(entry.runner.describe(frame), dtype=np.float64).ravel() for frame in frames]
-    if len({len(one) for one in vectors}) > 1 or not all(np.isfinite(one).all() for one in vectors):
-        raise MethodError(f"{label}: describe() gave vectors of several lengths, or numbers that are not finite")
+    vectors: list[FloatArray] = []
+    for frame in frames:
+        vectors.append(vector_of(entry.runner.describe(frame), vectors[0] if vectors else None, label))
     return np.array(vectors)
 
 

@@ -30,7 +30,7 @@ ALL_TOWNS: Final = "all towns"
 def report_town(folder: Path, name: str, found: Findings) -> None:
     """Write ``robustness.json``, ``.md``, ``.png``, ``.html`` and ``places.png`` of one town, and print the tables."""
     text = "\n".join([
-        conditions_markdown(name, found.table), yardsticks_markdown(found.results), places_markdown(found.places),
+        conditions_markdown(name, found.table), yardsticks_markdown(found.results, found.failed), places_markdown(found.places),
         kidnapping_markdown(found.kidnapped), paper_lengths_markdown(found.paper), targets_markdown(found.targets()),
         failures_markdown(found.failures()),
     ])  # fmt: skip
@@ -49,7 +49,7 @@ def report_towns(out: Path, towns: Mapping[str, Findings]) -> None:
     pooled = merged(list(towns.values()))
     targets = {name: found.targets() for name, found in towns.items()}
     text = "\n".join([
-        conditions_markdown(f"{ALL_TOWNS}: {', '.join(towns)}", pooled.table), yardsticks_markdown(pooled.results),
+        conditions_markdown(f"{ALL_TOWNS}: {', '.join(towns)}", pooled.table), yardsticks_markdown(pooled.results, pooled.failed),
         places_markdown(pooled.places), towns_targets_markdown(targets, pooled.targets()),
     ])  # fmt: skip
     by_town = {name: {target.item: target.value for target in found} for name, found in targets.items()}

@@ -27,7 +27,7 @@ from hippodrome.eval.trials.robustness.conditions import CONDITIONS, SAME, chose
 from hippodrome.eval.trials.robustness.findings import Findings
 from hippodrome.eval.trials.robustness.kidnapping import Kidnapping, kidnappings
 from hippodrome.eval.trials.robustness.localize import localized_sequence, sequence_steps
-from hippodrome.eval.trials.robustness.methods import FAR_M, MethodTask, describe_places, localizing, try_method
+from hippodrome.eval.trials.robustness.methods import FAR_M, MethodTask, describe_places, left_out, localizing, try_method
 from hippodrome.eval.trials.robustness.paper_lengths import PaperSequence, paper_sequences
 from hippodrome.eval.trials.robustness.place_recognition import half_known, queries_of, recognise
 from hippodrome.eval.trials.robustness.recall import PlaceResult
@@ -112,7 +112,7 @@ def _town(scenario: Scenario, conditions: Sequence[str], request: RobustnessRequ
     kidnapped = dict(zip(conditions, pool.run("kidnap", _kidnap, tasks), strict=True))
     paper = pool.run("lengths", _paper_lengths, tasks[:1])[0]
     path = map_path(scenario, out)
-    failed = {one.label: one.failure for one in tried if one.failure is not None}
+    failed = {**{one.label: one.failure for one in tried if one.failure is not None}, **left_out(scenario)}
     views = len(load_map(path)[0].view_cells.templates)
     found = Findings(results, places, kidnapped, paper, path.stat().st_size, views, failed)
     report_town(out / scenario.name, scenario.name, found)

@@ -36,9 +36,9 @@ def conditions_markdown(name: str, results: Sequence[ConditionResult]) -> str:
     return _part(f"# Localization under other conditions: {name}", table(["condition", *FIGURES], rows, align="left"), DEFINITION)
 
 
-def yardsticks_markdown(results: Sequence[ConditionResult]) -> str:
+def yardsticks_markdown(results: Sequence[ConditionResult], failed: Mapping[str, str]) -> str:
     """One row a mode of the localizer, and one a method beside ours: all conditions of the mapped town pooled, and the error
-    under the same condition."""
+    under the same condition. Methods that ``failed`` have a row without figures, and the cause below."""
     rows = []
     for mode in dict.fromkeys(result.mode for result in results):
         of_mode = [result for result in results if result.mode == mode and result.name != ELSEWHERE]
@@ -46,7 +46,9 @@ def yardsticks_markdown(results: Sequence[ConditionResult]) -> str:
         same = [_figures(result.summary(), "error_mean_m", "error_p95_m") for result in of_mode if result.name == SAME]
         rows.append([mode, *_cells(row), same[0] if same else NONE])
     head = ["mode", *FIGURES, "same: error mean / p95, m"]
-    return _part("## Yardsticks, given the same injections, and other methods", table(head, rows, align="left"))
+    rows += [[label, *[NONE] * (len(head) - 1)] for label in failed]
+    why = "\n".join(f"- {label}: {cause}" for label, cause in failed.items())
+    return _part("## Yardsticks, given the same injections, and other methods", table(head, rows, align="left"), why)
 
 
 def places_markdown(results: Sequence[PlaceResult]) -> str:

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from hippodrome._files import write_atomically
-from hippodrome.eval.contest.entry import Added, Entry, entries_of, with_methods
+from hippodrome.eval.contest.entry import Added, Entry, as_option, entries_of, with_methods
 from hippodrome.eval.contest.sources import methods_sha256
 from hippodrome.eval.contest.trials import added_methods
 from hippodrome.eval.figures.stress import draw_stress
@@ -41,14 +41,16 @@ class StressTask:
     cases: tuple[StressCase, ...]
     out: Path
     path: Path  # the scenario's file, for the command that reruns a row
+    added: frozenset[str] = frozenset()  # names of the methods that are not in that file, for the command as well
 
     def plan(self) -> RecordingPlan:
         """The mapping drive that all cases start from."""
         return RecordingPlan(self.scenario, "mapping", self.out)
 
-    def rerun(self, case: StressCase) -> str:
-        """The command that runs one case alone."""
-        return f"hippodrome stress {self.path} --seeds {self.scenario.seed} --case '{case.name}'"
+    def rerun(self, case: StressCase, method: str = "") -> str:
+        """The command that runs one case alone, and the method ``method`` in it, if that is not in the scenario's file."""
+        command = f"hippodrome stress {self.path} --seeds {self.scenario.seed} --case '{case.name}'"
+        return f"{command} {as_option(method, self.scenario.methods[method])}" if method in self.added else command
 
     def row_file(self, case: StressCase, method: str = "") -> Path:
         """Where the case's row is kept: a name made of all that the row depends on."""
@@ -118,7 +120,7 @@ def _rows_of_methods(task: StressTask, drive: StressedDrive) -> list[StressRow]:
         for case in (one for one in task.cases if not one.ours_alone):
             file = task.row_file(case, label)
             if not file.exists():
-                row = run_method(case, drive, entry, task.rerun(case))
+                row = run_method(case, drive, entry, task.rerun(case, label))
                 write_atomically(file, to_json(asdict(row)).encode())
             rows.append(StressRow(**json.loads(file.read_text())))
     return rows
@@ -150,7 +152,9 @@ def _tasks(
     """Cases grouped by the drive that they need: the lateral wander of a noise level makes another one, and so does the
     self-similar grid, which is run with the first scenario only (``with_grid``).
     """
-    scenario = with_methods(read_scenario(path, seed=seed), methods)
+    read = read_scenario(path, seed=seed)
+    scenario = with_methods(read, methods)
+    added = frozenset(scenario.methods) - frozenset(read.methods)
     groups: dict[tuple[NoiseLevel, bool], list[StressCase]] = {}
     for case in cases:
         if with_grid or not case.self_similar:
@@ -161,6 +165,7 @@ def _tasks(
             tuple(group),
             out,
             path,
+            added,
         )
         for (level, grid), group in groups.items()
     ]

@@ -1,21 +1,29 @@
 """A Python class takes part: what it declares, what it is given, and a row with the cause for whatever it does."""
 
 import textwrap
+from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import hippodrome.eval.contest.perform
 from hippodrome.core.types import HippodromeError
+from hippodrome.eval.contest.apart import CHILD
 from hippodrome.eval.contest.entry import BUILT_IN, entries_of, parse_method, with_methods
 from hippodrome.eval.contest.loading import load_class, made_of
 from hippodrome.eval.contest.perform import perform
+from hippodrome.eval.programs.containment import can_contain
 from hippodrome.sim.scenario import Scenario
 from tests.eval.contest.entrants import MAPPER
 
 MODULE = f"""\
+import os, sys, time
+from dataclasses import replace
 import numpy as np
 from pydantic import BaseModel
-from hippodrome.eval.methods.protocol import Answer, Needs
+from hippodrome.core.types import Trajectory
+from hippodrome.eval.methods.protocol import Answer, Mapped, Needs
 {MAPPER}
 class Configured(Mapper):
     class Config(BaseModel):
@@ -71,6 +79,62 @@ class Words:
     def map(self, observations, given):
         return ["a", "b"]
 
+class Odd(Mapper):  # what comes of it is found out when it is scored, not before
+    def map(self, observations, given):
+        poses = np.array(list(super().map(observations, given)))
+        return Mapped(Trajectory(poses[:, 0], poses[:, 1:]), figures=dict(ape="good"))
+
+class Saves(Mapper):
+    def map(self, observations, given):
+        poses = np.array(list(super().map(observations, given)))
+        self.text = "a map"
+        return Mapped(Trajectory(poses[:, 0], poses[:, 1:]), save=lambda path: path.write_text(self.text))
+
+class SavesNot(Saves):
+    def map(self, observations, given):
+        return replace(super().map(observations, given), save=lambda path: 1 / 0)
+
+class Reads(Mapper):  # standard input, which is not its own
+    def map(self, observations, given):
+        sys.stdin.read()
+        return super().map(observations, given)
+
+class Asks(Mapper):
+    def map(self, observations, given):
+        input("which way?")
+
+class Scribbles(Mapper):
+    def map(self, observations, given):
+        for number in range(3, 30):
+            try:
+                os.write(number, bytes([255]) * 1000)
+            except OSError:
+                pass
+        return super().map(observations, given)
+
+class Speechless:
+    def map(self, observations, given):
+        class Silence(Exception):
+            def __str__(self):
+                raise ValueError
+        raise Silence
+
+class Gibberish:
+    def map(self, observations, given):
+        raise ValueError("\\udcff\\x1b[31m")
+
+class Lambda(Mapper):
+    def map(self, observations, given):
+        return Mapped(Trajectory(np.zeros(1), np.zeros((1, 3))), figures=dict(mine=lambda: 1))
+
+class Daemon(Mapper):
+    def map(self, observations, given):
+        if os.fork() == 0:
+            os.setsid()
+            time.sleep(1000.0 + given.seed)
+        (given.folder.parent / "forked").touch()
+        return super().map(observations, given)
+
 class Half(Mapper):
     def map(self, observations, given):
         return list(super().map(observations, given))[:350]
@@ -121,6 +185,16 @@ def module(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
 
 
+def processes():
+    """The processes in which a class of a method runs, by their numbers."""
+    found = set()
+    for entry in Path("/proc").iterdir():
+        with suppress(OSError):
+            if entry.name.isdigit() and CHILD.encode() in (entry / "cmdline").read_bytes():
+                found.add(int(entry.name))
+    return found
+
+
 def row_of(materials, name, scenario=None):
     entry = entries_of(with_methods(scenario or materials.scenario, [parse_method(f"mine=entrants:{name}")]))[-1]
     return perform(materials, [entry]).rows[0]
@@ -155,12 +229,42 @@ def test_a_localizer_answers_once_per_observation(materials):
         ("Nothing", "map() gave a NoneType"),
         ("Words", "map() gave no trajectory"),
         ("Little", "cover"),
+        ("Odd", "'ape', which is measured here"),
+        ("SavesNot", "ZeroDivisionError"),
+        ("Asks", "EOFError"),
+        ("Scribbles", "it wrote to a file that it did not open"),
+        ("Speechless", "Silence: it cannot say why"),
+        ("Gibberish", "ValueError: ??[31m"),
+        ("Lambda", "cannot be handed over"),
     ],
 )
 def test_whatever_it_does_wrong_is_in_its_row(materials, name, cause):
     row = row_of(materials, name)
     assert cause in row.failure
     assert row.ape is None
+
+
+def test_a_class_may_read_standard_input_and_save_what_stays_in_its_process(materials):
+    assert row_of(materials, "Reads").failure is None
+    row = row_of(materials, "Saves")
+    assert (row.failure, row.map_bytes) == (None, len("a map"))
+    assert (materials.folder / "mine.pbstream").read_text() == "a map"
+
+
+def test_what_a_class_leaves_running_ends_with_it(materials):
+    if not can_contain():
+        pytest.skip("this system has no namespaces for users")
+    before = processes()
+    assert row_of(materials, "Daemon").failure is None
+    assert processes() <= before
+
+
+def test_what_cannot_be_scored_falls_in_its_own_row(materials, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("by chance")
+
+    monkeypatch.setattr(hippodrome.eval.contest.perform, "row_of", broken)
+    assert "crashed: ZeroDivisionError: by chance" in row_of(materials, "Mapper").failure
 
 
 def test_a_method_that_maps_well_and_answers_nothing_keeps_its_errors(materials):
@@ -196,6 +300,14 @@ def test_a_configuration_is_checked_by_the_method_s_own_model(materials):
 def test_a_class_that_is_not_there_is_named(reference, cause):
     with pytest.raises(HippodromeError, match=cause):
         load_class(reference)
+
+
+@pytest.mark.parametrize("text", ["raise SystemExit(0)", "raise BaseException", "import", "1 / 0"])
+def test_a_module_that_cannot_be_imported_is_a_sentence(tmp_path, text):
+    name = f"script_{abs(hash(text))}"
+    (tmp_path / f"{name}.py").write_text(text)
+    with pytest.raises(HippodromeError, match=r"importing it failed: .*line 1"):
+        load_class(f"{name}:Mapper")
 
 
 def test_a_class_without_any_of_the_functions_is_refused(materials):

@@ -2,12 +2,14 @@
 
 import stat
 import sys
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
 from hippodrome.eval.contest.entry import Added, entries_of, with_methods
 from hippodrome.eval.contest.perform import perform
-from hippodrome.eval.programs.process import can_conceal
+from hippodrome.eval.programs.containment import can_contain
 from hippodrome.sim.method_spec import MethodSpec
 
 INTEGRATE = """\
@@ -46,7 +48,7 @@ def python(text):
 
 @pytest.mark.parametrize("layout", ["tum", "euroc", "kitti", "rosbag2", "mcap"])
 def test_a_program_has_a_row_with_errors_and_costs(row, layout):
-    found = row(python(INTEGRATE), input=layout)
+    found = row(python(f"{INTEGRATE}import time\ntime.sleep(0.2)\n"), input=layout)  # long enough to be seen
     assert found.failure is None
     assert found.ape.mean_m < 1.0
     assert found.cpu_percent > 0.0
@@ -142,12 +144,63 @@ def test_a_file_that_is_no_program_is_a_row(row):
 
 
 def test_no_truth_can_be_reached(row, tmp_path):
-    if not can_conceal():
+    if not can_contain():
         pytest.skip("this system has no mount namespaces for users")
     text = f"#!/bin/sh\ncat {tmp_path}/recordings/one/truth.txt; ls -A {tmp_path}/recordings; echo end; exit 1\n"
     assert "its last words: end" in row(text).failure
     spy = f'#!/bin/sh\nfound=$(cat {tmp_path}/recordings/one/truth.txt 2>/dev/null)\necho "found $found."; exit 1\n'
     assert "found ." in row(spy).failure
+
+
+STEAL = """\
+import os, subprocess, sys
+here = "{here}"
+for folder in ("recordings", "results"):
+    subprocess.run(["umount", f"{{here}}/{{folder}}"], capture_output=True)
+    subprocess.run(["unshare", "--mount", "umount", "-l", f"{{here}}/{{folder}}"], capture_output=True)
+places = [f"/proc/{{pid}}/root" for pid in os.listdir("/proc") if pid.isdigit()] + [""]
+found = [place for place in places if os.path.exists(f"{{place}}{{here}}/recordings/one/truth.txt")]
+sys.exit(f"it sees {{len(places) - 1}} processes and the truth at {{len(found)}} places")
+"""
+
+
+def test_the_covers_cannot_be_taken_away_and_no_other_process_is_seen(row, tmp_path):
+    if not can_contain():
+        pytest.skip("this system has no namespaces for users")
+    assert "it sees 2 processes and the truth at 0 places" in row(python(STEAL.format(here=tmp_path))).failure
+
+
+@pytest.mark.parametrize(
+    "link", ["ln -s $HERE/recordings/one/truth.tum $2/trajectory.tum", "rmdir $2; ln -s $HERE/recordings/one $2"]
+)
+def test_what_it_leaves_is_a_file_and_no_way_to_one(row, tmp_path, link):
+    for name in ("truth", "trajectory"):
+        (tmp_path / f"recordings/one/{name}.tum").write_text("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n")
+    assert "as a link, which is not followed" in row(f"#!/bin/sh\nHERE={tmp_path}\n{link}\n").failure
+
+
+@pytest.mark.parametrize("gone", ["rm -r $2", "rm -r $(dirname $2)"])
+def test_a_folder_that_it_takes_away_is_nothing_left(row, gone):
+    assert "left no trajectory.tum in {out}, but nothing" in row(f"#!/bin/sh\n{gone} 2>/dev/null; exit 0\n").failure
+
+
+def test_a_file_of_too_many_lines_is_not_taken_apart(row):
+    assert "lines, the limit is" in row("#!/bin/sh\nyes 1 | head -n 5000000 > $2/trajectory.tum\n").failure
+
+
+def test_daemons_end_with_it_and_its_last_words_are_its_own(row):
+    if not can_contain():
+        pytest.skip("this system has no namespaces for users")
+    text = "#!/bin/sh\nenv -i setsid sleep 1234567 &\necho last words; kill -SEGV $$\n"
+    assert row(text).failure == "crashed: signal 11 (SIGSEGV); its last words: last words"
+    assert not any(b"1234567" in one for one in commands())
+
+
+def commands():
+    """The command lines of all processes."""
+    for entry in Path("/proc").iterdir():
+        with suppress(OSError):
+            yield (entry / "cmdline").read_bytes() if entry.name.isdigit() else b""
 
 
 def test_a_second_drive_is_localized_in_what_the_program_left(row, materials):

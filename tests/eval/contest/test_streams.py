@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hippodrome.core.types import HippodromeError
 from hippodrome.eval.contest.entry import Added, entries_of, parse_method, with_methods
 from hippodrome.eval.contest.perform import perform
+from hippodrome.eval.programs.stream import answer_of
+from hippodrome.proto import method_stream_pb2 as pb
 from hippodrome.sim.method_spec import MethodSpec
 from tests.eval.contest.entrants import MAPPER
 
@@ -140,6 +143,13 @@ def test_whatever_it_does_wrong_is_in_its_row(materials, program, text, cause):
     row = rows_of(materials, stream(program(text), time_limit_s=2.0)).rows[0]
     assert cause in row.failure
     assert row.ape is None
+
+
+def test_a_covariance_has_nine_numbers_or_none():
+    assert answer_of(1.0, pb.Answer(known=True)).covariance is None
+    assert answer_of(1.0, pb.Answer(covariance=range(9))).covariance.shape == (3, 3)
+    with pytest.raises(HippodromeError, match="t_s=1 has a covariance of 3 numbers"):
+        answer_of(1.0, pb.Answer(covariance=[1.0, 2.0, 3.0]))
 
 
 def test_a_client_that_is_not_there_is_named(materials):

@@ -1,17 +1,21 @@
 """Methods of others in the trials: Table II, robustness and stress, on a drive made by the real simulator."""
 
+import shlex
 import textwrap
+from pathlib import Path
 
 import pytest
 
 from hippodrome.eval.contest.entry import parse_method, with_methods
 from hippodrome.eval.contest.trials import localize_added
 from hippodrome.eval.methods.materials import gather
+from hippodrome.eval.trials.robustness.methods import left_out
+from hippodrome.eval.trials.robustness.tables import yardsticks_markdown
 from hippodrome.eval.trials.stress.cases import StressCase
-from hippodrome.eval.trials.stress.run import applicable
+from hippodrome.eval.trials.stress.run import StressTask, applicable
 from hippodrome.eval.trials.stress.table import stress_markdown
 from hippodrome.eval.trials.stress.trial import StressedDrive, run_method
-from hippodrome.sim.scenario import load_scenario
+from hippodrome.sim.scenario import Scenario, load_scenario
 
 MODULE = """\
 import math
@@ -80,6 +84,25 @@ def test_stress_reaches_the_self_motion_and_the_roads_of_methods_in_the_network_
     assert "- Broken: paper, hamlet" in text
     for entry in entries:
         entry.close()
+
+
+@pytest.mark.parametrize("text", ["mine=my_module:Mine", "my own=exec:./run.sh {sequence} {out}", "fed=stream:python 'a b.py'"])
+def test_the_command_that_reruns_a_row_has_the_method_with_it(text, tmp_path):
+    added = parse_method(text)
+    scenario = Scenario(name="town", methods={"kept": "my_module:Kept", added.name: added.spec})
+    task = StressTask(scenario, (), tmp_path, Path("town.yaml"), frozenset([added.name]))
+    words = shlex.split(task.rerun(StressCase("paper"), added.name))
+    assert parse_method(words[words.index("--method") + 1]) == added
+    assert "--method" not in task.rerun(StressCase("paper"), "kept")
+    assert "--method" not in task.rerun(StressCase("paper"))
+
+
+def test_a_method_that_failed_or_has_nothing_to_do_is_named_in_the_table_of_robustness():
+    scenario = Scenario(name="town", methods={"mapper": {"command": "./run.sh {sequence} {out}"}})
+    text = yardsticks_markdown([], {"broken": "no idea", **left_out(scenario)})
+    assert "| broken | - |" in text
+    assert "- broken: no idea" in text
+    assert "- mapper: left out: it neither localizes nor describes views" in text
 
 
 def test_false_closures_are_errors_of_our_own_map():

@@ -21,18 +21,22 @@ import traceback
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from hippodrome.eval import cli
 from hippodrome.eval.cli import main
 from tests.changes import change
 
+CHECKOUT: Final = Path(__file__).parents[1]
 LONGEST_S: Final = 30  # of CPU time: a case that takes longer hangs
 WAITING: Final = 4  # times as long by the clock, as programs that a case starts and others on the machine take time, too
 LARGEST_KB: Final = 1 << 20  # of growth of the process, or of a program that it started, in one case
-FAULTS: Final = ("traceback", "hang", "memory", "no sentence")
+FAULTS: Final = ("traceback", "hang", "memory", "no sentence", "warning")
+OURS: Final = tuple(str(CHECKOUT / part) + os.sep for part in (".ns", "core", "eval", "proto", "sim"))
 
 
 class TooLong(BaseException):
@@ -85,15 +89,16 @@ def run_case(subject: Subject, whole: Path, seed: int, place: Path) -> Outcome:
 
 
 def _run(subject: Subject, command: list[str], said: str) -> Outcome:
-    out, err = io.StringIO(), io.StringIO()
+    out, err, warned = io.StringIO(), io.StringIO(), list[warnings.WarningMessage]()
     before, began = _largest_kb(), time.process_time()
     alarms = (signal.SIGALRM, signal.SIGPROF)
     previous = [signal.signal(number, _too_long) for number in alarms]
     signal.setitimer(signal.ITIMER_PROF, subject.longest_s)
     signal.alarm(WAITING * subject.longest_s)
     try:
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("ignore")
+            warnings.simplefilter("always", RuntimeWarning)
             status = main(command)
     except SystemExit as error:
         status = int(error.code or 0)
@@ -108,6 +113,9 @@ def _run(subject: Subject, command: list[str], said: str) -> Outcome:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         for number, handler in zip(alarms, previous, strict=True):
             signal.signal(number, handler)
+    if ours := [one for one in warned if one.filename.startswith(OURS)]:  # the user would see it between our sentences
+        where = f"{Path(ours[0].filename).name}:{ours[0].lineno}"
+        return Outcome("warning", f"{said}: {ours[0].message} at {where}", False)
     if (took_s := time.process_time() - began) > subject.longest_s:
         return Outcome("hang", f"{said}: {took_s:.0f} s", False)
     if (grown := _largest_kb() - before) > LARGEST_KB:
@@ -187,6 +195,7 @@ def _main() -> int:
     parser.add_argument("--case", type=int, help="break one input of the subject --only as in this case, and show what happens")
     parser.add_argument("--keep", type=Path, help="folder for the inputs; an empty one (default: one that is removed)")
     options = parser.parse_args()
+    cli.make_parser = lru_cache(maxsize=1)(cli.make_parser)  # making it anew takes as long as a case
     subjects = [one for one in (*MORE, *SUBJECTS) if one.name.startswith(tuple(options.only.split(",")))]
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.keep or Path(temporary)

@@ -125,10 +125,16 @@ def _convert(source: Path, plain: Path, made: Path, choice: Choice, more: tuple[
     convert = _convert_opendrive if plain.suffix == ".xodr" else _convert_osm
     notes = convert(source, plain, made, choice, more)
     if not _has_roads(made):
-        raise HippodromeError(
-            f"{source}: holds no roads for cars (footways, tracks and service roads are none); choose a larger extract"
-        )
+        raise HippodromeError(f"{source}: holds no roads for cars{_why_none(_lines(_log_of(made)))}")
     return notes
+
+
+def _why_none(log: list[str]) -> str:
+    """Why a map has no roads for cars, and what to do, as the end of a sentence."""
+    if at_rest := [line for line in log if "because it has speed" in line]:
+        words = at_rest[0].removeprefix("Warning: ").rstrip(".")
+        return f" that may move ({len(at_rest)} edges, netconvert: {words}); correct maxspeed there"
+    return " (footways, tracks and service roads are none); choose a larger extract"
 
 
 def _convert_osm(source: Path, plain: Path, made: Path, choice: Choice, more: tuple[str, ...]) -> tuple[str, ...]:
@@ -179,7 +185,7 @@ def _side_notes(side: DrivingSide) -> tuple[str, ...]:
 
 def _netconvert(source: Path, plain: Path, made: Path, options: tuple[str, ...]) -> tuple[str, ...]:
     """Run netconvert, and what it warned of. It writes no file where there is no road. Raises HippodromeError."""
-    log = made.with_name("warnings.txt")
+    log = _log_of(made)
     kind = "osm" if plain.suffix == ".osm" else "opendrive"
     files = f"--{kind}-files={plain}", f"--output-file={made}", f"--error-log={log}"
     try:
@@ -189,6 +195,10 @@ def _netconvert(source: Path, plain: Path, made: Path, options: tuple[str, ...])
             return ()
         raise HippodromeError(f"{source}: cannot be imported: {_with_cure(str(error), log)}") from error
     return netconvert_notes(_lines(log), made)
+
+
+def _log_of(made: Path) -> Path:
+    return made.with_name("warnings.txt")
 
 
 def _lines(log: Path) -> list[str]:

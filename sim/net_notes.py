@@ -22,6 +22,8 @@ from hippodrome.sim.network import (
     junction_gaps,
 )
 
+LEAP: Final = 10.0  # a lane drawn so many times as long as it is counted cannot be driven as drawn
+LONG_M: Final = 20.0  # shorter lanes may be counted as anything: netconvert has its least length
 COINCIDENT_M: Final = 1.0  # nodes closer than this are one crossing to a driver
 
 
@@ -30,9 +32,21 @@ def check_network(net: SumoNet, network: RoadNetwork, net_file: Path) -> tuple[s
     drivable = drivable_edges(network)
     if len(drivable) == 0:
         raise HippodromeError(f"{net_file}: no closed loop for passenger cars, so no tour can return; add a way round or U-turns")
+    if (fault := _counted_shorter(net, network)) is not None:
+        raise HippodromeError(f"{net_file}: {fault}; leave its length out, or write the network again with netconvert")
     gaps = junction_gaps(network, net_file)
     notes = (_disconnected(network, drivable), _zero_length(network), _coincident(net), _held_signals(net), _shared_lanes(net))
     return (*gaps, *(note for kind in notes for note in kind))
+
+
+def _counted_shorter(net: SumoNet, network: RoadNetwork) -> str | None:
+    """A lane on which vehicles would leap, as its attribute ``length`` is a small part of what is drawn; None: there is none."""
+    drawn_m = network.lane_lengths_m()
+    for lane in np.flatnonzero((drawn_m > LONG_M) & ~network.is_internal).tolist():
+        counted_m = float(net.getLane(network.lane_ids[lane]).getLength())
+        if drawn_m[lane] > LEAP * counted_m:
+            return f"lane {network.lane_ids[lane]!r} is drawn {drawn_m[lane]:.0f} m long and said to be {counted_m:g} m"
+    return None
 
 
 def _disconnected(network: RoadNetwork, drivable: IntArray) -> Iterable[str]:

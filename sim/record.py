@@ -76,7 +76,7 @@ class RecordingPlan:
             "role": self.role,
             "seed": scenario.seed,
             "town": scenario.town.model_dump(mode="json", exclude={"network"}),
-            "network_sha256": sha256_of(self.town().net_file),
+            "network_sha256": _network_sha256(self.town()),
             "drive": self.drive_spec.model_dump(mode="json", exclude={"recording", "closed"}),
             "camera": scenario.camera.model_dump(mode="json"),
             "odometry_rate_hz": scenario.odometry_rate_hz,
@@ -100,6 +100,12 @@ def numpy_simd() -> list[str]:
     extensions: Any = np.show_config(mode="dicts")
     simd = extensions.get("SIMD Extensions", {})
     return [*simd.get("baseline", ()), *simd.get("found", ())]
+
+
+@lru_cache(maxsize=4)
+def _network_sha256(town: Town) -> str:
+    """Of the town's file; asked for with each chunk of frames, and a large network takes a tenth of a second."""
+    return sha256_of(town.net_file)
 
 
 @lru_cache(maxsize=4)

@@ -28,6 +28,7 @@ from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
 from hippodrome.sim.sumo_tools import check_that_sumo_reads, run_tool
+from hippodrome.sim.town_file import kept_town
 from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.types import Town
 
@@ -56,9 +57,8 @@ def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
     """The town of a scenario. What is generated lies below ``work_dir``, named by its content's recipe, and is made once."""
     if spec.network is not None:
         net_file, notes = sumo_network(spec.network, work_dir, spec.driving_side)
-        town = read_town(net_file)
+        town = kept_town(net_file, work_dir, lambda: _that_sumo_reads(net_file))
         _check_side(spec.driving_side, town.left_hand, spec.network)
-        check_that_sumo_reads(net_file)
         return replace(town, notes=(*notes, *town.notes))
     what = spec.model_dump_json(exclude={"driving_side"} if spec.driving_side != "left" else None)
     recipe = f"{what} {rng_seed} {CONVERT_OPTIONS} {CROSSING_RADIUS_M} {THROUGH_RADIUS_M}"
@@ -66,6 +66,13 @@ def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
     if not net_file.exists():
         _write_plan_as_net(_plan(spec, rng_seed), spec, net_file)
     return replace(read_town(net_file, name=spec.kind), rural=spec.kind == "rural")
+
+
+def _that_sumo_reads(net_file: Path) -> Town:
+    """A town from a network that somebody gives."""
+    town = read_town(net_file)
+    check_that_sumo_reads(net_file)
+    return town
 
 
 def _check_side(choice: Choice, left_hand: bool, network: Path) -> None:

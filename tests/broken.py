@@ -21,18 +21,22 @@ import traceback
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from hippodrome.eval import cli
 from hippodrome.eval.cli import main
 from tests.changes import change
 
+CHECKOUT: Final = Path(__file__).parents[1]
 LONGEST_S: Final = 30  # of CPU time: a case that takes longer hangs
 WAITING: Final = 4  # times as long by the clock, as programs that a case starts and others on the machine take time, too
 LARGEST_KB: Final = 1 << 20  # of growth of the process, or of a program that it started, in one case
-FAULTS: Final = ("traceback", "hang", "memory", "no sentence")
+FAULTS: Final = ("traceback", "hang", "memory", "no sentence", "warning")
+OURS: Final = tuple(str(CHECKOUT / part) + os.sep for part in (".ns", "core", "eval", "proto", "sim"))
 
 
 class TooLong(BaseException):
@@ -85,15 +89,16 @@ def run_case(subject: Subject, whole: Path, seed: int, place: Path) -> Outcome:
 
 
 def _run(subject: Subject, command: list[str], said: str) -> Outcome:
-    out, err = io.StringIO(), io.StringIO()
+    out, err, warned = io.StringIO(), io.StringIO(), list[warnings.WarningMessage]()
     before, began = _largest_kb(), time.process_time()
     alarms = (signal.SIGALRM, signal.SIGPROF)
     previous = [signal.signal(number, _too_long) for number in alarms]
     signal.setitimer(signal.ITIMER_PROF, subject.longest_s)
     signal.alarm(WAITING * subject.longest_s)
     try:
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("ignore")
+            warnings.simplefilter("always", RuntimeWarning)
             status = main(command)
     except SystemExit as error:
         status = int(error.code or 0)
@@ -108,6 +113,9 @@ def _run(subject: Subject, command: list[str], said: str) -> Outcome:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         for number, handler in zip(alarms, previous, strict=True):
             signal.signal(number, handler)
+    if ours := [one for one in warned if one.filename.startswith(OURS)]:  # the user would see it between our sentences
+        where = f"{Path(ours[0].filename).name}:{ours[0].lineno}"
+        return Outcome("warning", f"{said}: {ours[0].message} at {where}", False)
     if (took_s := time.process_time() - began) > subject.longest_s:
         return Outcome("hang", f"{said}: {took_s:.0f} s", False)
     if (grown := _largest_kb() - before) > LARGEST_KB:
@@ -129,22 +137,37 @@ def _too_long(*_: Any) -> None:
     raise TooLong
 
 
-def campaign(subjects: Sequence[Subject], cases: int, seed: int, folder: Path, most_s: float, tell: Any = None) -> list[Outcome]:
-    """The outcomes of ``cases`` broken inputs, as many of each subject, in turns; fewer where ``most_s`` are over before."""
+def campaign(
+    subjects: Sequence[Subject], cases: int, seed: int, folder: Path, most_s: float, tell: Any = None, even_time: bool = False
+) -> list[Outcome]:
+    """The outcomes of ``cases`` broken inputs; fewer where ``most_s`` are over before.
+
+    The subjects take turns. With ``even_time`` the one that has had the least CPU time is next, so that cheap readers, of which
+    most break in most ways, get most of the cases; the n-th case of a subject is the same either way.
+    """
     found: list[Outcome] = []
     end_s, wholes = time.monotonic() + most_s, {subject.name: folder / f"whole-{subject.name}" for subject in subjects}
     for subject in subjects:
         wholes[subject.name].mkdir(parents=True)
         subject.write(wholes[subject.name])
-    for number in range(-(-cases // max(len(subjects), 1))):
-        for subject in subjects:
-            if time.monotonic() > end_s:
-                return found
-            one = run_case(subject, wholes[subject.name], seed * 1_000_000 + number, folder / "case")
-            found.append(replace(one, detail=f"{subject.name}: {one.detail}"))
-            if tell is not None and one.fault:
-                tell(found[-1])
+    done, spent_s = dict.fromkeys(wholes, 0), dict.fromkeys(wholes, 0.0)
+    for number in range(cases if subjects else 0):
+        if time.monotonic() > end_s:
+            break
+        subject = min(subjects, key=lambda one: spent_s[one.name]) if even_time else subjects[number % len(subjects)]
+        began = _cpu_s()
+        one = run_case(subject, wholes[subject.name], seed * 1_000_000 + done[subject.name], folder / "case")
+        spent_s[subject.name] += _cpu_s() - began
+        done[subject.name] += 1
+        found.append(replace(one, detail=f"{subject.name}: {one.detail}"))
+        if tell is not None and one.fault:
+            tell(found[-1])
     return found
+
+
+def _cpu_s() -> float:
+    """CPU time so far, of this process and of the programs that it waited for."""
+    return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 
 
 def _again(subject: Subject, case: int, folder: Path) -> None:
@@ -165,10 +188,14 @@ def _main() -> int:
     parser.add_argument("--cases", type=int, default=1000, help="how many in all (default: 1000)")
     parser.add_argument("--seed", type=int, default=0, help="of the random changes (default: 0)")
     parser.add_argument("--seconds", type=float, default=3600.0, help="after these nothing new is begun (default: 3600)")
+    parser.add_argument(
+        "--even-time", action="store_true", help="as much CPU time for each reader instead of as many cases: many more cases"
+    )
     parser.add_argument("--only", default="", help="names of subjects that begin so, with commas (default: all)")
     parser.add_argument("--case", type=int, help="break one input of the subject --only as in this case, and show what happens")
     parser.add_argument("--keep", type=Path, help="folder for the inputs; an empty one (default: one that is removed)")
     options = parser.parse_args()
+    cli.make_parser = lru_cache(maxsize=1)(cli.make_parser)  # making it anew takes as long as a case
     subjects = [one for one in (*MORE, *SUBJECTS) if one.name.startswith(tuple(options.only.split(",")))]
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.keep or Path(temporary)
@@ -179,7 +206,7 @@ def _main() -> int:
         print(f"{options.cases} cases of {len(subjects)} readers, seed {options.seed}; limits: {LONGEST_S} s of CPU and "
               f"{LARGEST_KB >> 10} MiB a case, {options.seconds:g} s in all", flush=True)  # fmt: skip
         found = campaign(subjects, options.cases, options.seed, folder, options.seconds,
-                         lambda one: print(f"{one.fault}: {one.detail}", flush=True))  # fmt: skip
+                         lambda one: print(f"{one.fault}: {one.detail}", flush=True), options.even_time)  # fmt: skip
     for subject in subjects:
         own = [one for one in found if one.detail.startswith(f"{subject.name}: ")]
         print(f"{subject.name:<18} {len(own):5d} cases {sum(one.accepted for one in own):5d} accepted "

@@ -18,7 +18,7 @@ from hippodrome.eval.drive.table import print_table
 from hippodrome.eval.drive.task import MissionTask, missions_of, run_mission
 from hippodrome.eval.files.scenarios import effective_configuration
 from hippodrome.eval.pool import worker_pool
-from hippodrome.eval.programs.process import can_conceal
+from hippodrome.eval.programs.containment import can_contain
 from hippodrome.eval.report.drives import DRIVE_PAGE
 from hippodrome.eval.report.report import REPORT, write_report
 from hippodrome.eval.results.model import (
@@ -191,7 +191,7 @@ def _declaration(row: RowSpec) -> Declaration | None:
     """What a policy was given, and whether the truth was within its reach; none for a row of ours."""
     if row.policy is None:
         return None
-    return Declaration(frame="network", given=GIVEN, source=row.policy.source, isolated=can_conceal())
+    return Declaration(frame="network", given=GIVEN, source=row.policy.source, isolated=can_contain())
 
 
 def _is_serious(drive: dict[str, Any]) -> bool:

@@ -47,7 +47,7 @@ def draw_maps_over_truth(
     """
     figure = new_figure(7.2, 6.4)
     axes = figure.subplots()
-    draw_network(axes, network)
+    draw_network(axes, network, truth_m)
     axes.plot(truth_m[:, 0], truth_m[:, 1], color=TRUTH, linewidth=0.9, label="ground truth", zorder=2.5)
     sizes = np.linspace(*DOT_SIZES, len(maps_m))  # good maps cover one another, so smaller dots of later ones leave a rim
     for (name, positions_m), colour, size in zip(maps_m.items(), SERIES, sizes, strict=False):
@@ -96,7 +96,7 @@ def draw_error_map(
     """
     figure = new_figure(7.6, 6.4)
     axes = figure.subplots()
-    draw_network(axes, network)
+    draw_network(axes, network, positions_m)
     order = np.argsort(errors_m, kind="stable")  # the worst on top
     dots = axes.scatter(
         positions_m[order, 0],

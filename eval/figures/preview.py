@@ -30,7 +30,7 @@ def draw_preview(
     """
     figure = new_figure(7.6, 7.0)
     axes = figure.subplots()
-    draw_network(axes, network)
+    draw_network(axes, network, np.concatenate([mapping_m[:, :2], second_m[:, :2]]))
     steps = np.stack([mapping_m[:-1, :2], mapping_m[1:, :2]], axis=1)
     often = np.clip(visits[1:], 1, len(VISIT_COLOURS))
     for times, (colour, label) in enumerate(zip(VISIT_COLOURS, VISIT_LABELS, strict=True), start=1):

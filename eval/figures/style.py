@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from hippodrome._files import write_atomically
 from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.types import FloatArray, IntArray
 
 Axes: TypeAlias = Any  # matplotlib ships no types
 
@@ -32,6 +33,9 @@ WITHOUT_DATE: Final[dict[str, dict[str, None]]] = {  # what a program usually no
     "svg": {"Date": None, "Creator": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
+WHOLE_LANES_M: Final = 200e3  # a network with more of them is not drawn whole: a drive would be a dot in it
+AROUND_M: Final = 300.0  # of it, lanes this far around a drive are drawn
+AROUND_SHARE: Final = 0.25  # or this share of the drive's larger extent, if that is more
 FLOOR_M = 0.01  # where logarithmic error axes begin
 
 
@@ -87,11 +91,23 @@ def log_errors(axes: Axes, errors_m: np.ndarray[Any, Any]) -> None:
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
 
 
-def draw_network(axes: Axes, network: RoadNetwork) -> None:
-    """The lanes' centrelines in grey, equal scales, metres."""
-    lines = [network.lane_points_m(lane) for lane in range(network.lane_count)]
+def draw_network(axes: Axes, network: RoadNetwork, drive_m: FloatArray) -> None:
+    """The lanes' centrelines in grey, equal scales, metres; of a large network those around a drive (N, 2 or more columns)."""
+    lines = [network.lane_points_m(lane) for lane in _drawn_lanes(network, drive_m[:, :2])]
     axes.add_collection(LineCollection(lines, colors=ROAD, linewidths=1.0, zorder=0))
     frame_map(axes, "x east (m)", "y north (m)")
+
+
+def _drawn_lanes(network: RoadNetwork, drive_m: FloatArray) -> IntArray:
+    """All lanes of a network that is drawn whole, else those that reach into the box of the drive and its surroundings."""
+    if network.lane_lengths_m()[~network.is_internal].sum() <= WHOLE_LANES_M or len(drive_m) == 0:
+        return np.arange(network.lane_count, dtype=np.int32)
+    low_m, high_m = drive_m.min(axis=0), drive_m.max(axis=0)
+    around_m = max(AROUND_M, AROUND_SHARE * float((high_m - low_m).max()))
+    first = network.point_start[:-1]
+    least_m, most_m = (bound.reduceat(network.points_m, first, axis=0) for bound in (np.minimum, np.maximum))
+    reaches = np.all((most_m >= low_m - around_m) & (least_m <= high_m + around_m), axis=1)
+    return np.flatnonzero(reaches).astype(np.int32)
 
 
 def frame_map(axes: Axes, x_label: str, y_label: str) -> None:

@@ -94,13 +94,6 @@ def to_record(finding: Finding) -> dict[str, Any]:
     return asdict(finding)
 
 
-def from_record(record: dict[str, Any]) -> Finding:
-    """What ``to_record`` made, also after a way through JSON."""
-    offset = record["offset_m"]
-    points = tuple((float(x), float(y)) for x, y in record["points_m"])
-    return Finding(**{**record, "points_m": points, "offset_m": None if offset is None else (offset[0], offset[1])})
-
-
 def _drawn_off(refinement: Refinement, vouched: BoolArray, sigma_m: float) -> list[Finding]:
     """Stretches whose road is drawn to one side of where it was driven; one that is driven again is told once."""
     error_m, covariance = refinement.map_error_m, refinement.cognitive_map.covariance

@@ -122,7 +122,7 @@ def run_drive(options: RunOptions) -> None:
     stages.run("score", None, lambda: _score(options, topometric, recording))
     stages.run("page", None, lambda: _write_page(options, recording, net_file, stages))
     cognitive_map = load_map(topometric)[0]
-    print(_verdict(cognitive_map, read_breaks(out / REFINEMENT)))
+    print(_verdict(cognitive_map, read_breaks(out / REFINEMENT, len(cognitive_map.t_s))))
     print(f"open {out / PAGE}")
 
 
@@ -200,14 +200,15 @@ def _score(options: RunOptions, topometric: Path, recording: Path) -> None:
 
 
 def _write_page(options: RunOptions, recording: Path, net_file: Path, stages: _Stages) -> None:
-    findings, map_error_m = read_findings(options.out / REFINEMENT)
+    cognitive_map = load_map(options.out / TOPOMETRIC)[0]
+    findings, map_error_m = read_findings(options.out / REFINEMENT, len(cognitive_map.t_s))
     drive = Drive(
         name=options.drive.name,
         network=options.network.name,
         recording=open_recording(recording, verify=False),
-        cognitive_map=load_map(options.out / TOPOMETRIC)[0],
+        cognitive_map=cognitive_map,
         roads=_silently(lambda: read_roads(net_file, options.out)),
-        breaks=read_breaks(options.out / REFINEMENT),
+        breaks=read_breaks(options.out / REFINEMENT, len(cognitive_map.t_s)),
         findings=findings,
         map_error_m=map_error_m,
         reference=reference_of(net_file),

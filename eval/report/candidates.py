@@ -108,14 +108,12 @@ def _true_m(truth: Trajectory, t_s: float) -> FloatArray | None:
 
 def lanes_beside(place_m: FloatArray, roads: RoadNetwork, own: int) -> tuple[LaneCandidate, ...]:
     """The lanes nearest to a place (2,), but for the one it lies on, number ``own``."""
+    first = roads.point_start[:-1]
+    least_m, most_m = (bound.reduceat(roads.points_m, first, axis=0) for bound in (np.minimum, np.maximum))
+    outside_m = np.maximum(np.maximum(least_m - place_m, place_m - most_m), 0.0)
     found = []
-    for lane in range(roads.lane_count):
-        points_m = roads.lane_points_m(lane)
-        outside_m = np.maximum(np.maximum(points_m.min(axis=0) - place_m, place_m - points_m.max(axis=0)), 0.0)
-        if (
-            lane != own
-            and np.hypot(*outside_m) <= BESIDE_M
-            and (apart_m := LineString(points_m).distance(Point(place_m))) <= BESIDE_M
-        ):
+    for lane in np.flatnonzero(np.hypot(*outside_m.T) <= BESIDE_M).tolist():
+        apart_m = LineString(roads.lane_points_m(lane)).distance(Point(place_m))
+        if lane != own and apart_m <= BESIDE_M:
             found.append(LaneCandidate(lane=roads.lane_ids[lane], apart_m=round(float(apart_m), DECIMALS_M)))
     return tuple(sorted(found, key=lambda one: (one.apart_m, one.lane))[:COUNT])

@@ -117,14 +117,16 @@ def beside(pieces: Pieces, is_internal: np.ndarray, side: int, probe_m: float = 
     near = tree.query(probe, k=neighbours, distance_upper_bound=6.0)[1].reshape(len(probe), neighbours)
     found = near < len(probe)
     other = np.where(found, near, 0)
-    offset = probe[:, None, :] - pieces.middle_m()[other]
-    normal = pieces.left_normal()
-    across = np.abs(np.sum(offset * normal[other], axis=2))
-    along = np.abs(offset[..., 0] * normal[other][..., 1] - offset[..., 1] * normal[other][..., 0])
+    middle, normal = pieces.middle_m(), pieces.left_normal()
     half_length = 0.5 * np.linalg.norm(pieces.end_m - pieces.start_m, axis=1)
     covers = found & (pieces.lane[other] != pieces.lane[:, None])
-    covers &= np.abs(pieces.middle_z_m()[other] - pieces.middle_z_m()[:, None]) < LEVEL_M
-    covers &= (across <= pieces.half_width_m[other] + 0.1) & (along <= half_length[other] + 0.3)
+    here, place = np.nonzero(covers)  # few of the neighbours: most pieces near by are of the same lane
+    there = other[here, place]
+    offset = probe[here] - middle[there]
+    across = np.abs(offset[:, 0] * normal[there, 0] + offset[:, 1] * normal[there, 1])
+    along = np.abs(offset[:, 0] * normal[there, 1] - offset[:, 1] * normal[there, 0])
+    level = np.abs(pieces.middle_z_m()[there] - pieces.middle_z_m()[here]) < LEVEL_M
+    covers[here, place] = level & (across <= pieces.half_width_m[there] + 0.1) & (along <= half_length[there] + 0.3)
     hit = np.argmax(covers, axis=1)
     row = other[np.arange(len(probe)), hit]
     lane = np.where(np.any(covers, axis=1), pieces.lane[row], -1)

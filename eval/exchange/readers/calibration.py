@@ -95,7 +95,8 @@ def _numbers(path: Path, text: str, count: int) -> FloatArray:
 def _calibration(
     path: Path, matrix: FloatArray, distortion: FloatArray, size_px: tuple[int, int] | None, fisheye: bool = False
 ) -> Calibration:
-    pinhole = matrix / matrix[2, 2] if matrix[2, 2] else matrix
+    with np.errstate(all="ignore"):  # what is no number then is refused below
+        pinhole = matrix / matrix[2, 2] if matrix[2, 2] else matrix
     values = np.concatenate([pinhole.ravel(), distortion])
     if not np.isfinite(values).all() or min(pinhole[0, 0], pinhole[1, 1]) <= 1.0 or np.abs(pinhole[2, :2]).max() > 1e-9:
         raise ExchangeError(f"{path}: not a camera matrix (fx 0 cx, 0 fy cy, 0 0 1 in pixels)")

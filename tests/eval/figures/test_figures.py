@@ -6,6 +6,7 @@ import pytest
 
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import AttractorStates, CognitiveMap, Edges, LocalizationEstimate, ViewCells, Visits
+from hippodrome.eval.figures import style
 from hippodrome.eval.figures.errors import draw_error_profiles, draw_error_violins
 from hippodrome.eval.figures.frames import draw_contact_sheet
 from hippodrome.eval.figures.localization import (
@@ -124,3 +125,22 @@ def test_strip_steps_crowd_towards_the_start():
 def test_a_sheet_needs_a_caption_for_each_frame(tmp_path):
     with pytest.raises(ValueError, match="2 frames and 1 captions"):
         draw_contact_sheet(tmp_path / "a.png", frames(2), ["one"])
+
+
+def test_of_a_large_network_the_lanes_around_the_drive_are_drawn(monkeypatch):
+    roads = straight_roads(40)  # one every 100 m
+    drive_m = np.array([[10.0, 1000.0], [60.0, 1050.0]])
+    assert len(style._drawn_lanes(roads, drive_m)) == 40
+    monkeypatch.setattr(style, "WHOLE_LANES_M", 1e3)
+    assert style._drawn_lanes(roads, drive_m).tolist() == [7, 8, 9, 10, 11, 12, 13]
+
+
+def straight_roads(count):
+    points = [[[0.0, 100.0 * k], [100.0, 100.0 * k]] for k in range(count)]
+    none, starts = np.full(count, -1, dtype=np.int32), np.arange(count + 1, dtype=np.int32)
+    return RoadNetwork(
+        lane_ids=tuple(f"{k}_0" for k in range(count)), edge_ids=tuple(map(str, range(count))),
+        lane_edge=starts[:-1], is_internal=np.zeros(count, dtype=np.bool_), width_m=np.full(count, 3.2),
+        speed_limit_mps=np.full(count, 8.0), points_m=np.array(points).reshape(-1, 2), point_start=2 * starts,
+        successor=np.zeros(0, dtype=np.int32), successor_start=0 * starts, left_lane=none, right_lane=none,
+    )  # fmt: skip

@@ -8,10 +8,11 @@ import pytest
 
 from hippodrome.core.matching.confidence import match_breaks
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import MatchStatus, Refinement, RoadMatch
+from hippodrome.core.types import HippodromeError, MatchStatus, Refinement, RoadMatch
 from hippodrome.eval.real.drive import marks
-from hippodrome.eval.real.findings import find_wrong_roads, from_record, to_record, usual_error_m
+from hippodrome.eval.real.findings import find_wrong_roads, to_record, usual_error_m
 from hippodrome.eval.real.findings_file import write_findings
+from hippodrome.eval.real.kept import read_breaks, read_findings
 from tests.proto.maps import random_map
 
 SIGMA_M = 2.5
@@ -126,9 +127,27 @@ def test_a_stretch_that_hangs_on_nothing_vouched_tells_nothing():
     assert find_wrong_roads(drive_east(status=status), straight_road(((0.0, 90.0), (9.0, 90.0))), SIGMA_M) == ()
 
 
-def test_findings_survive_the_record_of_a_run():
+def test_findings_survive_the_record_of_a_run_and_broken_ones_are_refused(tmp_path):
     found = find_wrong_roads(drive_east(bump(5.0)), straight_road(EAST), SIGMA_M)
-    assert tuple(from_record(json.loads(json.dumps(to_record(one)))) for one in found) == found
+    kept, content = tmp_path / "refinement.json", {"breaks": [], "map_error_m": [0.5, 2]}
+    one = to_record(found[0])
+    kept.write_text(json.dumps({**content, "findings": [one]}))
+    assert read_findings(kept, 10_000) == (found[:1], (0.5, 2.0))
+    wrong = (
+        {"first_vertex": 10**400},
+        {"last_vertex": 10**9},
+        {"first_vertex": -1},
+        {"length_m": "x"},
+        {"kind": 3},
+        {"points_m": 1},
+    )
+    for findings in (7, [7], [{}], *([{**one, **change}] for change in wrong), [{**one, "sigma_m": float("nan")}]):
+        kept.write_text(json.dumps({**content, "findings": findings}))
+        with pytest.raises(HippodromeError, match="delete it"):
+            read_findings(kept, 10_000)
+    kept.write_text(json.dumps({"breaks": [{"first": 10**30, "last": 10**31, "status": "OFF_NETWORK", "cause": ""}]}))
+    with pytest.raises(HippodromeError, match="of a map of 46: not the breaks"):
+        read_breaks(kept, 46)
 
 
 def test_the_usual_error_is_that_of_the_vouched_stretches():

@@ -1,0 +1,64 @@
+"""A large town is read once and kept: what comes from disk is what was read, and a damaged file is made anew."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from hippodrome.core.types import HippodromeError
+from hippodrome.sim import town_file
+from hippodrome.sim.sumo_tools import run_tool
+from hippodrome.sim.town import TownSpec, build_town, read_town
+from hippodrome.sim.town_file import kept_town
+
+
+def same(one, other):
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and np.array_equal(one, other)
+    if hasattr(one, "__dataclass_fields__"):
+        return all(same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
+    return type(one) is type(other) and one == other
+
+
+@pytest.fixture
+def net_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(town_file, "LARGE_BYTES", 0)
+    path = tmp_path / "Straße 1.net.xml"
+    run_tool("netgenerate", "--grid", "--grid.number=3", "--grid.length=80", "--tls.guess", "-o", str(path))
+    return path
+
+
+def with_heights(town):
+    outlines = tuple(np.arange(float(len(outline))) for outline in town.junction_polygons_m)
+    return replace(town, heights_m=np.arange(float(len(town.network.points_m))), junction_heights_m=outlines, notes=("a\nb", "ü"))
+
+
+@pytest.mark.parametrize("town_of", [lambda town: town, with_heights], ids=["flat", "with heights"])
+def test_a_town_comes_back_as_it_was(tmp_path, net_file, town_of):
+    folder = tmp_path / "towns"
+    read = town_of(read_town(net_file))
+    assert kept_town(net_file, folder, lambda: read) is read
+    kept = kept_town(net_file, folder, lambda: pytest.fail("read again"))
+    assert same(kept, read) and kept.network.lane_count > 20
+    (path,) = folder.glob("*.town.npz")
+    whole = path.read_bytes()
+    for broken in (whole[:-300], whole[:2000] + bytes(8) + whole[2008:], b""):  # cut, changed, empty
+        path.write_bytes(broken)
+        assert kept_town(net_file, folder, lambda: read) is read
+        assert path.read_bytes() == whole
+
+
+def test_a_scenario_s_town_is_kept_unless_it_is_refused(tmp_path, net_file):
+    folder = tmp_path / "towns"
+    first = build_town(TownSpec(network=net_file), 1, folder)
+    assert same(first, build_town(TownSpec(network=net_file), 1, folder))
+    with pytest.raises(HippodromeError, match="keeps right"):
+        build_town(TownSpec(network=net_file, driving_side="left"), 1, folder)
+    net_file.write_text(net_file.read_text().replace("<edge ", "<edge x='1' ", 1))
+    assert same(first, build_town(TownSpec(network=net_file), 1, folder)) and len(list(folder.iterdir())) == 2
+    net_file.write_text(net_file.read_text()[:4000])
+    with pytest.raises(HippodromeError, match="broken network"):
+        build_town(TownSpec(network=net_file), 1, folder)
+    assert len(list(folder.iterdir())) == 2

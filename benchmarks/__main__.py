@@ -19,6 +19,7 @@ NAMES = {
     "matching": "matching a drive to lanes, beside two well-known map matchers",
     "reading": "reading the road in frames",
     "stream": "feeding a program frame by frame",
+    "real": "real drives on real maps, where they lie beside the checkout (benchmarks.real itself prints more)",
     "scaling": "refinement time and memory against the length of the drive",
 }
 

@@ -70,9 +70,9 @@ def shown_sigma_m(
 
     1 - P / sigma^2 is the share of the error that the drive determines, and each axis has one independent error every two
     correlation lengths. This is an estimate of a component of variance at its prior value (MINQUE, Rao 1971). A path bends to
-    follow the roads, and what the solution lays to the odometry may be the map's: ``drift_variance_m2`` over a correlation length
-    is added, so that v is an upper bound. Where drive and roads agree, the map is proven to be good; where they do not, either
-    may be wrong, and sigma stays. The prior, a scaled inverse chi-squared distribution, counts as nu errors seen before:
+    follow the roads, and what the solution lays to the odometry may be the map's: ``drift_variance_m2`` over two correlation
+    lengths is added, so that v is an upper bound. Where drive and roads agree, the map is proven to be good; where they do not,
+    either may be wrong, and sigma stays. The prior, a scaled inverse chi-squared distribution, counts as nu errors seen before:
 
         sigma'^2 = (nu sigma^2 + D min(v, sigma^2)) / (nu + D)
 
@@ -94,7 +94,7 @@ def shown_sigma_m(
     left = 0.5 * (covariance[:, 4, 4] + covariance[:, 5, 5]) / assumed
     freedom = float(np.sum(weight * np.clip(1.0 - left, 0.0, 1.0)))
     squares = float(np.sum(weight * np.mean(state.map_error_m**2, axis=1)))
-    drift = drift_variance_m2(noise, model.length_m)
+    drift = drift_variance_m2(noise, 2.0 * model.length_m)
     shown = min(squares + freedom * drift, freedom * assumed)  # D min(v, sigma^2)
     return float(np.sqrt((known_freedom * assumed + shown) / (known_freedom + freedom)))
 

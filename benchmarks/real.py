@@ -191,12 +191,13 @@ def print_controls(drives: list[RealDrive], networks: dict[str, RoadNetwork]) ->
     """The drives where they did not drive: those of which anything is vouched for, and how many there were."""
     count, wrong, longest = 0, 0, 0.0
     for drive in drives:
+        print(f"controls of {drive.name} ...", file=sys.stderr, flush=True)
         for words, offered, network in controls(drive, networks):
             began = time.process_time()
             share = accepted(offered, network)
             longest, count, wrong = max(longest, time.process_time() - began), count + 1, wrong + (share > 0.0)
             if share > 0.0:
-                print(f"{drive.name} {words}: {share:.1%} vouched for, though it did not drive there")
+                print(f"{drive.name} {words}: {share:.1%} vouched for, though it did not drive there", flush=True)
     print(f"\n{count} controls, {wrong} of them vouched for anywhere; the longest took {longest:.1f} s of CPU", flush=True)
 
 

@@ -19,6 +19,8 @@ NAMES = {
     "matching": "matching a drive to lanes, beside two well-known map matchers",
     "reading": "reading the road in frames",
     "stream": "feeding a program frame by frame",
+    "real": "real drives on real maps, where they lie beside the checkout (benchmarks.real itself prints more)",
+    "large": "finding a drive of unknown start in 180 and in 1,000 km of road",
     "scaling": "refinement time and memory against the length of the drive",
 }
 

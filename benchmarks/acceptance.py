@@ -7,14 +7,12 @@ that they drove. ``--networks`` adds drives through other networks; each drive i
     python -m benchmarks.acceptance --seeds 3
     python -m benchmarks.acceptance --seeds 1 --networks a.net.xml b.net.xml
 
-    python -m benchmarks.acceptance --seeds 1 --real semi.pbstream map.net.xml
-
 A row of the table is one kind of offer at one length. *Accepted* is the share of samples that are vouched for, *wrong* the share
 that is vouched for and 20 m or more off the true place (of a control: all that is vouched for), *some wrong* the number of drives
 with any of that. Below, the evidence by which segments are accepted, as a curve (ROC): for each threshold, the share of the
 segments on the right road that have as much, and of those that are not. The logistic fit to them is the probability that a
-segment is right. Last, how far each drive goes in its own network until any of it is vouched for; ``--real`` adds semi-metric
-maps of real drives there.
+segment is right. Last, how far each drive goes in its own network until any of it is vouched for. ``benchmarks.real`` asks the
+same of real drives.
 """
 
 from __future__ import annotations
@@ -44,8 +42,6 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, HippodromeError, MatchStatus, Visits
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.trials.stress.perturbations import without_roads
-from hippodrome.proto.codec import load_map
-from hippodrome.sim.network import read_network
 from hippodrome.sim.record import RecordingPlan, simulate
 from hippodrome.sim.scenario import DriveSpec, Scenario
 from hippodrome.sim.tour_spec import TourSpec
@@ -223,10 +219,6 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--seeds", type=int, default=2, metavar="N", help="towns of each kind (default: 2)")
     parser.add_argument("--networks", type=Path, nargs="*", default=[], metavar="NET.xml", help="SUMO networks to drive in, too")
-    parser.add_argument(
-        "--real", type=Path, nargs=2, action="append", default=[], metavar=("MAP", "NET.xml"),
-        help="a semi-metric map of a real drive and its network, to see how far it goes until it is vouched for",
-    )  # fmt: skip
     options = parser.parse_args(arguments)
     rng, found = np.random.default_rng(0), []
     with TemporaryDirectory() as folder:
@@ -248,9 +240,7 @@ def main(arguments: list[str]) -> int:
         found += offers(drive, None if other is drive else other.network, rng)
     print_table(found)
     print_curve(found)
-    real = [(load_map(path)[0].visits, read_network(network)) for path, network in options.real]
-    own = [*((drive.visits, drive.network) for drive in drives), *real]
-    print_metres(np.array([metres_until_vouched(visits, network) for visits, network in own]))
+    print_metres(np.array([metres_until_vouched(drive.visits, drive.network) for drive in drives]))
     return 0
 
 

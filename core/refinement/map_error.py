@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hippodrome.core.refinement.factors import BinaryFactors, State, UnaryFactors, normal_blocks
+from hippodrome.core.refinement.noise import Noise
 from hippodrome.core.types import Edges, FloatArray, Visits
 
 LEAST_APART_M = 0.1  # places closer than this have one error of the map, but the equations must keep their condition
@@ -43,8 +44,7 @@ def map_error_factors(state: State, visits: Visits, closures: Edges, model: MapE
     error = state.map_error_m
     assert error is not None
     scale = np.exp(state.log_scale)
-    driven = scale[:-1] * np.hypot(visits.motion[1:, 0], visits.motion[1:, 1])
-    keep = np.exp(-np.maximum(driven, LEAST_APART_M) / model.length_m)
+    keep = np.exp(-np.maximum(driven_m(state, visits), LEAST_APART_M) / model.length_m)
     step_gain = 1.0 / (model.sigma_m * np.sqrt(1.0 - keep**2))
     apart = np.maximum(scale[closures.source] * np.hypot(closures.motion[:, 0], closures.motion[:, 1]), LEAST_APART_M)
     closure_gain = 1.0 / (model.sigma_m * np.sqrt(-2.0 * np.expm1(-apart / model.length_m)))
@@ -55,6 +55,64 @@ def map_error_factors(state: State, visits: Visits, closures: Edges, model: MapE
         _error_differences(error[1:] - keep[:, None] * error[:-1], keep, step_gain),
         _error_differences(error[closures.target] - error[closures.source], np.ones_like(apart), closure_gain),
     )
+
+
+def shown_sigma_m(
+    model: MapErrorModel, known_freedom: float, state: State, covariance: FloatArray, noise: Noise, visits: Visits
+) -> float:
+    """The standard deviation of the map's error that the drive has shown, in metres, as far as it shows any.
+
+    The accuracy that was assumed, sigma, is that of maps of this kind; this very map may be a better one. With e the estimated
+    errors and P their posterior variances, both in the mean of the two axes, and w the driven metres that each keyframe stands
+    for, the drive shows
+
+        freedom D = sum w (1 - P / sigma^2) / length,   variance v = (sum w e^2 / length) / D + odometry's share
+
+    1 - P / sigma^2 is the share of the error that the drive determines, and each axis has one independent error every two
+    correlation lengths. This is an estimate of a component of variance at its prior value (MINQUE, Rao 1971). A path bends to
+    follow the roads, and what the solution lays to the odometry may be the map's: ``drift_variance_m2`` over two correlation
+    lengths is added, so that v is an upper bound. Where drive and roads agree, the map is proven to be good; where they do not,
+    either may be wrong, and sigma stays. The prior, a scaled inverse chi-squared distribution, counts as nu errors seen before:
+
+        sigma'^2 = (nu sigma^2 + D min(v, sigma^2)) / (nu + D)
+
+    A short drive, and a road that nothing vouches for, determine next to nothing, and leave it at sigma. The estimate looks at
+    the size of the errors and not at their steps from keyframe to keyframe, which tell how smoothly the roads are drawn.
+
+    Args:
+        model: the error of the map that was assumed.
+        known_freedom: nu.
+        state: the solution for S keyframes.
+        covariance: (S, 6, 6) of the solution.
+        noise: of the odometry, as it was estimated.
+        visits: raw motions of the keyframes.
+    """
+    assert state.map_error_m is not None
+    steps_m = driven_m(state, visits)
+    weight = 0.5 * (np.append(steps_m, 0.0) + np.append(0.0, steps_m)) / model.length_m
+    assumed = model.sigma_m**2
+    left = 0.5 * (covariance[:, 4, 4] + covariance[:, 5, 5]) / assumed
+    freedom = float(np.sum(weight * np.clip(1.0 - left, 0.0, 1.0)))
+    squares = float(np.sum(weight * np.mean(state.map_error_m**2, axis=1)))
+    drift = drift_variance_m2(noise, 2.0 * model.length_m)
+    shown = min(squares + freedom * drift, freedom * assumed)  # D min(v, sigma^2)
+    return float(np.sqrt((known_freedom * assumed + shown) / (known_freedom + freedom)))
+
+
+def drift_variance_m2(noise: Noise, length_m: float) -> float:
+    """Variance in each axis, in the mean of along and across, that odometry gathers over ``length_m`` of driving.
+
+    Errors along and across are random walks; heading and log scale are, too, and move the place by their integrals.
+    """
+    walks = (noise.along**2 + noise.across**2) * length_m
+    integrals = (noise.heading**2 + noise.log_scale**2) * length_m**3 / 3.0
+    return 0.5 * (walks + integrals)
+
+
+def driven_m(state: State, visits: Visits) -> FloatArray:
+    """Driven metres (S - 1,) from each keyframe to the next."""
+    metres: FloatArray = np.exp(state.log_scale[:-1]) * np.hypot(visits.motion[1:, 0], visits.motion[1:, 1])
+    return metres
 
 
 def _error_differences(residual: FloatArray, keep: FloatArray, gain: FloatArray) -> BinaryFactors:

@@ -63,7 +63,7 @@ def refine_route(
         log_scale, free = solution.state.log_scale, near_lane_changes(line, network)
         solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver)
     status = reject_displaced(status, route, solution.state.drawn_points_m, config.confidence)
-    status = reject_uncertain(status, solution.covariance[:, :2, :2], config.confidence)
+    status = reject_uncertain(status, solution.assumed_covariance[:, :2, :2], config.confidence)
     return _refinement(cognitive_map, network, line, solution, status)
 
 
@@ -130,7 +130,8 @@ def _covariance(covariance: FloatArray, network: RoadNetwork, status: UInt8Array
 
 def _estimates(solution: RouteSolution) -> dict[str, float]:
     """What the refinement has estimated besides the poses, for reports: name, with its unit, to value."""
-    noise = solution.noise
+    noise, shown_m = solution.noise, solution.shown_survey_sigma_m
+    of_map = {} if shown_m is None else {"survey_sigma_m": shown_m}
     return {
         "odometry_along_m_per_root_m": noise.along,
         "odometry_across_m_per_root_m": noise.across,
@@ -141,4 +142,5 @@ def _estimates(solution: RouteSolution) -> dict[str, float]:
         "closure_sigma_factor": noise.closure_factor,
         "gyro_gain_error": float(solution.state.gyro[0]),
         "gyro_bias_radps": float(solution.state.gyro[1]),
+        **of_map,
     }

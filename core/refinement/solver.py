@@ -13,7 +13,7 @@ from hippodrome.core.matching.route_line import RouteLine
 from hippodrome.core.refinement.config import SolverConfig
 from hippodrome.core.refinement.covariance import posterior_covariance, with_systematic_errors
 from hippodrome.core.refinement.factors import State
-from hippodrome.core.refinement.map_error import MapErrorModel
+from hippodrome.core.refinement.map_error import MapErrorModel, driven_m, map_error_factors, shown_sigma_m
 from hippodrome.core.refinement.noise import Noise, rescaled, variance_factors
 from hippodrome.core.refinement.residuals import (
     Factors,
@@ -39,6 +39,8 @@ class RouteSolution:
     arc_m: FloatArray  # (S,) place of each keyframe on the route's line
     noise: Noise
     covariance: FloatArray  # (S, 4, 4) x, y, heading, log scale; (S, 6, 6) with the error of the map
+    assumed_covariance: FloatArray  # the same if the map is as accurate as was assumed, not as the drive has shown it to be
+    shown_survey_sigma_m: float | None = None  # how accurate the drive has shown the map to be; None: it was not asked
 
 
 def refine_along_route(
@@ -98,8 +100,16 @@ def _refined(
         for _ in range(config.inner_iterations):
             state, factor = gauss_newton_step(state, visits, closures, targets, noise, scale_step_variance)
         noise, scale_step_variance = estimate_noise(state, visits, closures, targets, noise, scale_step_variance, factor)
-    covariance = posterior_covariance(state, all_factors(state, visits, closures, targets, noise, scale_step_variance), closures)
-    return RouteSolution(state, arc_m, noise, with_systematic_errors(covariance))
+    factors = all_factors(state, visits, closures, targets, noise, scale_step_variance)
+    covariance = assumed = posterior_covariance(state, factors, closures)
+    shown_m = None
+    if map_error is not None and config.survey_freedom is not None:
+        shown_m = shown_sigma_m(map_error, config.survey_freedom, state, assumed, noise, visits)
+        shown = map_error_factors(state, visits, closures, replace(map_error, sigma_m=shown_m))
+        covariance = posterior_covariance(state, factors._replace(map_error=shown), closures)
+    return RouteSolution(
+        state, arc_m, noise, with_systematic_errors(covariance), with_systematic_errors(assumed), shown_survey_sigma_m=shown_m
+    )
 
 
 def prior_scale_step_variance(state: State, visits: Visits, noise: Noise) -> FloatArray:
@@ -107,8 +117,7 @@ def prior_scale_step_variance(state: State, visits: Visits, noise: Noise) -> Flo
 
     The log scale is a random walk, whose variance grows with the driven metres.
     """
-    metres = np.exp(state.log_scale[:-1]) * np.hypot(visits.motion[1:, 0], visits.motion[1:, 1])
-    variance: FloatArray = noise.step_sigmas(metres)[:, 3] ** 2
+    variance: FloatArray = noise.step_sigmas(driven_m(state, visits))[:, 3] ** 2
     return variance
 
 

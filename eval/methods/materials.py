@@ -104,7 +104,8 @@ def true_start(drive: Recording) -> StartPose:
 def refine_config(scenario: Scenario, mode: RefineMode, survey_error_m: float | None = None) -> RefineConfig:
     """The scenario's configuration of the refinement in one mode, told how accurate the road network is.
 
-    Surveyors state the accuracy of their networks, and no drive can reveal it. A value that the scenario sets itself stands.
+    Surveyors state the accuracy of their networks, which is then taken as known exactly. A value that the scenario sets itself
+    stands.
 
     Args:
         scenario: Where the configuration is from.
@@ -115,7 +116,9 @@ def refine_config(scenario: Scenario, mode: RefineMode, survey_error_m: float | 
     if survey_error_m is None:
         survey_error_m = scenario.self_motion_noise.survey_error_m
     solver = config.route.solver
-    stated = solver if solver.survey_sigma_m is not None else replace(solver, survey_sigma_m=survey_error_m)
+    stated = solver
+    if solver.survey_sigma_m is None:
+        stated = replace(solver, survey_sigma_m=survey_error_m, survey_freedom=None)
     return replace(config, mode=mode, route=replace(config.route, solver=stated))
 
 

@@ -80,8 +80,8 @@ def fly(
             look(sensed, navigator)
         rows.append(_written(sensed, navigator, command.state))
         events += sensed.events
-        standing_s = standing_s + STEP_S if sensed.truth.speed_mps < STANDING_MPS else 0.0
-        arrived = command.state is DrivingState.ARRIVED and sensed.truth.speed_mps < STANDING_MPS
+        standing_s = standing_s + STEP_S if abs(sensed.truth.speed_mps) < STANDING_MPS else 0.0
+        arrived = command.state is DrivingState.ARRIVED and abs(sensed.truth.speed_mps) < STANDING_MPS
         if arrived:
             cause = "arrived"
         elif sensed.truth.t_s > limit_s(mission):
@@ -89,7 +89,7 @@ def fly(
         elif standing_s > STUCK_S:
             cause = f"stands: {command.state.name.lower()}, {command.reason}"
         else:
-            sensed = world.step(command.acceleration_mps2, command.steering_rad, command.indicator)
+            sensed = world.step(command.acceleration_mps2, command.steering_rad, command.indicator, command.reverse)
     return Flight(np.array(rows), tuple(events), sensed.truth.lane_id, arrived, cause.rstrip(", "), process_time() - began)
 
 

@@ -42,6 +42,8 @@ class EnvOptions:
         duration_s: after which a drive is truncated.
         radar: whether the radar is observed too.
         indicators: whether the action has a third number: below -1/3 the right indicator, above 1/3 the left one.
+        reverse: whether the action has one number more, its last: below 0 the reverse gear; with ``radar`` also ``gap_behind_m``
+            and ``moving_m`` are observed.
         acceleration_range_mps2, steering_range_rad: what the actions -1 and 1 mean.
     """
 
@@ -49,6 +51,7 @@ class EnvOptions:
     duration_s: float = 300.0
     radar: bool = False
     indicators: bool = False
+    reverse: bool = False
     acceleration_range_mps2: tuple[float, float] = ACCELERATION_RANGE_MPS2
     steering_range_rad: tuple[float, float] = STEERING_RANGE_RAD
 
@@ -87,13 +90,15 @@ class TownEnv(gymnasium.Env[Observed, Action]):
         self._sensed: Sensed | None = None
         camera = scenario.camera
         self._frame: Frame = np.zeros((camera.height, camera.width, 3), dtype=np.uint8)
-        self.action_space = spaces.Box(-1.0, 1.0, (3 if self.options.indicators else 2,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (2 + self.options.indicators + self.options.reverse,), np.float32)
         radar = {
             "gap_m": spaces.Box(0.0, RADAR_REACH_M, (1,), np.float32),
             "closing_mps": spaces.Box(-FASTEST_UNITS, FASTEST_UNITS, (1,), np.float32),
             "way_is_free": spaces.Discrete(2),
             "lamp": spaces.Discrete(len(Lamp)),
         }
+        if self.options.reverse:
+            radar |= {name: spaces.Box(0.0, RADAR_REACH_M, (1,), np.float32) for name in ("gap_behind_m", "moving_m")}
         self.observation_space = spaces.Dict(
             {
                 "frame": spaces.Box(0, 255, self._frame.shape, np.uint8),
@@ -123,13 +128,13 @@ class TownEnv(gymnasium.Env[Observed, Action]):
         accel = _mapped(float(numbers[0]), self.options.acceleration_range_mps2)
         steering = _mapped(float(numbers[1]), self.options.steering_range_rad)
         indicator = Indicator(int(np.sign(round(1.5 * float(numbers[2]))))) if self.options.indicators else Indicator.STRAIGHT
-        return self.drive(accel, steering, indicator)
+        return self.drive(accel, steering, indicator, self.options.reverse and float(numbers[-1]) < 0.0)
 
     def drive(
-        self, acceleration_mps2: float, steering_rad: float, indicator: Indicator
+        self, acceleration_mps2: float, steering_rad: float, indicator: Indicator, reverse: bool = False
     ) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """``step`` in SI units."""
-        sensed = self.world.step(acceleration_mps2, steering_rad, indicator)
+        sensed = self.world.step(acceleration_mps2, steering_rad, indicator, reverse)
         self._sensed = sensed
         gain, fines = self._reward.of(sensed)
         crashed = any(event.kind in (EventKind.COLLISION, EventKind.BUILDING) for event in sensed.events)
@@ -158,7 +163,7 @@ class TownEnv(gymnasium.Env[Observed, Action]):
             "frame": self._frame if observation.frame is not None else self._frame.copy(),
             "speed": _boxed(observation.speed, FASTEST_UNITS),
             "yaw_rate": _boxed(observation.yaw_rate_radps, FASTEST_TURN_RADPS),
-            **(_radar(sensed.radar) if self.options.radar else {}),
+            **(_radar(sensed.radar, self.options.reverse) if self.options.radar else {}),
         }
 
     def _info(self, sensed: Sensed, fines: dict[str, float]) -> dict[str, Any]:
@@ -170,7 +175,7 @@ class TownEnv(gymnasium.Env[Observed, Action]):
         truth, goal = sensed.truth, self._goal
         near = math.hypot(truth.x_m - goal.x_m, truth.y_m - goal.y_m) <= ARRIVED_M
         turn = abs((truth.heading_rad - goal.heading_rad + math.pi) % (2.0 * math.pi) - math.pi)
-        return near and turn <= ARRIVED_RAD and truth.speed_mps <= ARRIVED_MPS
+        return near and turn <= ARRIVED_RAD and abs(truth.speed_mps) <= ARRIVED_MPS
 
 
 def _mapped(number: float, bounds: tuple[float, float]) -> float:
@@ -183,9 +188,10 @@ def _boxed(value: float, most: float) -> Action:
     return np.clip(np.array([value], dtype=np.float32), -most, most)
 
 
-def _radar(radar: Radar) -> Observed:
+def _radar(radar: Radar, behind: bool) -> Observed:
+    gaps = {"gap_m": radar.gap_m, **({"gap_behind_m": radar.gap_behind_m, "moving_m": radar.moving_m} if behind else {})}
     return {
-        "gap_m": np.clip(np.array([radar.gap_m], dtype=np.float32), 0.0, RADAR_REACH_M),
+        **{name: np.clip(np.array([gap], dtype=np.float32), 0.0, RADAR_REACH_M) for name, gap in gaps.items()},
         "closing_mps": _boxed(radar.closing_mps, FASTEST_UNITS),
         "way_is_free": int(radar.way_is_free),
         "lamp": int(radar.lamp),

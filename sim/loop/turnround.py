@@ -14,7 +14,7 @@ from hippodrome.sim.loop.contact import EGO_SIZE_M, corners_m, ego_box
 from hippodrome.sim.loop.radar import outline_m
 from hippodrome.sim.loop.users import Users
 
-OVER_M: Final = 8.0  # driven forwards since the reverse gear was in: then the manoeuvre is over
+OVER_M: Final = 10.0  # driven forwards since the reverse gear was in: then the manoeuvre is over
 ROLLS_MPS: Final = 0.05  # a gear is in once the car rolls no more
 WATCHED_M: Final = 40.0  # others farther away from the ego see it in time, or need not care
 KEPT_M: Final = 2.0  # they stop so far from its body

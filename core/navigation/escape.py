@@ -17,7 +17,7 @@ from hippodrome.core.navigation.manoeuvre import BackOff, Manoeuvre, Sensed, Tur
 from hippodrome.core.navigation.pilot import RoutePlanner
 from hippodrome.core.navigation.rooms import RoomMap, before_obstacle, room_on_roads, room_on_seen_ground
 from hippodrome.core.navigation.senses import Senses
-from hippodrome.core.navigation.turning import Clearance, Leg, plan_turn
+from hippodrome.core.navigation.turning import Clearance, Leg, is_clear, plan_turn, poses_along
 from hippodrome.core.navigation.types import Command, DrivingState, Radar
 from hippodrome.core.types import FloatArray
 
@@ -40,6 +40,7 @@ TIGHT: Final[tuple[Clearance, ...]] = (
     Clearance(0.2, 0.0),
     Clearance(0.1, -0.25),
 )  # on ground that was seen, whose borders err to the narrow side
+LEAST: Final = Clearance(0.05, -0.4)  # a leg that would leave less than this ends early
 WIDEST_M: Final = 8.0  # from the vehicle to the far border: a wider road is turned round in with what it needs
 ASIDE_STEP_M: Final = 0.1
 
@@ -60,6 +61,7 @@ class Escape:
         self._trail: list[FloatArray] = []
         self._current: Manoeuvre | None = None
         self._turn_next: float | None = None  # turn once it has backed off: the gap ahead at its beginning, inf if none counts
+        self._known = False  # whether the manoeuvre was begun with a fix
         self._attempts, self._since_m = 0, math.inf
         self._moved = (0.0, 0.0)
         self.passes_side_street = False  # the search is to go straight on the next time
@@ -158,10 +160,13 @@ class Escape:
                     return legs
             return None
 
+        def is_free(leg: Leg) -> bool:
+            return bool(is_clear(poses_along(self._pose().tolist(), leg)[1:], room, self._config.vehicle, LEAST).all())
+
         legs = replan(0)
         if not legs:
             return False
-        self._current = Turn(replan, legs, self._state, self._config.vehicle)
+        self._current = Turn(replan, is_free, legs, self._state, self._config.vehicle)
         self._belief.turns_round, self._belief.plan = True, None
         return True
 

@@ -34,6 +34,7 @@ KEPT_M: Final = 0.8  # from whom the radar sees ahead or behind
 HELD_UP_S: Final = 6.0  # so long before somebody, a leg ends where it is
 CALM_M: Final = 25.0  # nobody who moves is nearer ..
 CALM_S: Final = 1.5  # .. for so long, before the vehicle goes across the road
+LOOK_M: Final = 0.25  # beyond where it would stop, a leg is looked at as it is driven
 MOST_LEGS: Final = 16  # of a turn, however often it is planned anew
 BACK_MPS: Final = 1.2
 DECAY_M: Final = 2.0  # over which an offset from the way back fades
@@ -65,15 +66,22 @@ class Turn:
 
     Args:
         replan: the legs from where the vehicle is, the first of them in a gear, 1 or -1; None where there is no room.
+        is_free: whether a short leg from where the vehicle is stays clear of the borders; one that would not ends early.
         legs: those to begin with.
         state: said meanwhile.
         vehicle: its wheelbase.
     """
 
     def __init__(
-        self, replan: Callable[[int], list[Leg] | None], legs: list[Leg], state: DrivingState, vehicle: VehicleShape
+        self,
+        replan: Callable[[int], list[Leg] | None],
+        is_free: Callable[[Leg], bool],
+        legs: list[Leg],
+        state: DrivingState,
+        vehicle: VehicleShape,
     ) -> None:
         self.failed = False
+        self._is_free, self._cut = is_free, False
         self._replan, self._legs, self._state, self._vehicle = replan, legs, state, vehicle
         self._indicator = Indicator.LEFT if sum(leg.turned_rad for leg in legs) > 0.0 else Indicator.RIGHT
         self._driven_m = self._turned_rad = self._calm_s = self._held_up_s = 0.0
@@ -90,7 +98,9 @@ class Turn:
         leg, backs = self._legs[0], self._legs[0].length_m < 0.0
         wheel = math.atan(self._vehicle.wheelbase_m * leg.curvature_1pm)
         stands, rest_m = abs(motion.speed_mps) < STANDS_MPS, self._rest_m(leg)
-        if rest_m < THERE_M or self._held_up_s > HELD_UP_S:
+        ahead = Leg(leg.curvature_1pm, math.copysign(LOOK_M + motion.speed_mps**2, leg.length_m))
+        self._cut = self._cut or self._held_up_s > HELD_UP_S or (not stands and rest_m > LOOK_M and not self._is_free(ahead))
+        if rest_m < THERE_M or self._cut:
             if not stands:
                 return self._command(FIRM_MPS2, wheel, backs)
             return self._next(motion, backs)
@@ -110,11 +120,12 @@ class Turn:
         """Begin the next leg, planned from where the vehicle is."""
         rest, gear = self._legs[1:], 1 if backs else -1
         self._count += 1
-        held_up, straight = self._held_up_s > HELD_UP_S, self._legs[0].curvature_1pm == 0.0
+        cut, straight = self._cut, self._legs[0].curvature_1pm == 0.0
         self._driven_m = self._turned_rad = self._held_up_s = 0.0
-        if not rest and not held_up:
+        self._cut = False
+        if not rest and not cut:
             return None
-        self._legs = (rest if straight and not held_up else self._replan(gear)) or rest
+        self._legs = (rest if straight and not cut else self._replan(gear)) or rest
         self.failed = not self._legs or self._count >= MOST_LEGS
         return None if self.failed else self._standing(motion.steering_rad, gear < 0, "turns round")
 

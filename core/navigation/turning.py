@@ -27,8 +27,9 @@ LONGEST_M: Final = 12.0  # of a leg: more than half of the turning circle
 SHORTEST_M: Final = 0.4  # a shorter leg is none
 LOCK_SHARE: Final = 0.97  # of the turning circle's curvature: the rest is for corrections
 BEAM: Final = 60  # kept after each leg
+GIVES_M: Final = 0.02  # who has less room than is to be kept may not have less by more than this
 MOST_LEGS: Final = 9
-SHARES: Final = (1.0, 0.8, 0.6, 0.4)  # of the longest leg that there is room for
+SHARES: Final = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the longest leg that there is room for
 GEAR_S: Final = 3.0  # what changing the gear costs
 OFFSET_S: Final = 3.0  # and what a metre beside the line at the end does
 LEFT_S: Final = 6.0  # what a radian that is left to turn will cost, for choosing the states that are kept
@@ -89,13 +90,18 @@ def poses_along(pose: Sequence[float], leg: Leg, step_m: float = STEP_M) -> Floa
 
 def is_clear(poses: FloatArray, room: Room, vehicle: VehicleShape, clearance: Clearance) -> BoolArray:
     """Which of the poses (n, 3) keep wheels and body clear of the borders."""
+    wheels_m, body_m = rooms_m(poses, room, vehicle)
+    clear: BoolArray = (wheels_m >= clearance.wheels_m) & (body_m >= clearance.body_m)
+    return clear
+
+
+def rooms_m(poses: FloatArray, room: Room, vehicle: VehicleShape) -> tuple[FloatArray, FloatArray]:
+    """The least room (n,) of wheels and of body at each of the poses (n, 3)."""
     wheels = _points(poses, [0.0, vehicle.wheelbase_m], vehicle.half_track_m)
     body = _points(poses, [-REAR_M, 0.5 * vehicle.front_m, vehicle.front_m], HALF_WIDTH_M)
-    rooms = room(np.concatenate([wheels.reshape(-1, 2), body.reshape(-1, 2)]))
-    wheel_m = rooms[: wheels.shape[0] * wheels.shape[1]].reshape(wheels.shape[:2]).min(axis=1)
-    body_m = rooms[wheels.shape[0] * wheels.shape[1] :].reshape(body.shape[:2]).min(axis=1)
-    clear: BoolArray = (wheel_m >= clearance.wheels_m) & (body_m >= clearance.body_m)
-    return clear
+    points = np.concatenate([wheels, body], axis=1)
+    found = room(points.reshape(-1, 2)).reshape(points.shape[:2])
+    return found[:, : wheels.shape[1]].min(axis=1), found[:, wheels.shape[1] :].min(axis=1)
 
 
 def _points(poses: FloatArray, ahead_m: Sequence[float], aside_m: float) -> FloatArray:
@@ -175,7 +181,9 @@ def _continued(state: _State, gear: int, lock: float, room: Room, vehicle: Vehic
     curvature = gear * math.copysign(lock, state.left_rad)  # backwards the wheels are held to the other side
     whole_m = min(abs(state.left_rad) / lock, LONGEST_M)
     poses = poses_along(state.pose, Leg(curvature, gear * whole_m))
-    blocked = np.flatnonzero(~is_clear(poses[1:], room, vehicle, clearance))
+    wheels_m, body_m = rooms_m(poses, room, vehicle)
+    least_m = min(clearance.wheels_m, wheels_m[0] - GIVES_M), min(clearance.body_m, body_m[0] - GIVES_M)
+    blocked = np.flatnonzero((wheels_m[1:] < least_m[0]) | (body_m[1:] < least_m[1]))
     free = int(blocked[0]) if len(blocked) else len(poses) - 1
     step_m = whole_m / (len(poses) - 1)
     found = []

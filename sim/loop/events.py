@@ -29,7 +29,7 @@ class Watch:
     lanes, junctions, turning places. *Left lane*: outside of junctions a wheel stands more than 5 cm outside of the ego's
     lane and those beside it in the same direction. *Left road*: the middle of the ego is off everything that is paved.
     *Wrong way*: outside of junctions the middle of the moving ego has been for half a second on a lane that runs against it
-    and on none that runs with it, but while it turns round, that is from the reverse gear on until 8 m have been driven
+    and on none that runs with it, but while it turns round, that is from the reverse gear on until 10 m have been driven
     forwards; or the ego has backed for more than 20 m in one such manoeuvre. *Red light*: the front bumper passes the end
     of a lane whose signal for the way taken is red, before and after the step; yellow is none. *Right of way*: the front
     bumper enters a junction and a vehicle that the ego had to let pass, on a way that crosses or meets the ego's, would be

@@ -24,9 +24,11 @@ from hippodrome.core.types import FloatArray
 TRAIL_STEP_M: Final = 0.25
 TRAIL_M: Final = 20.0  # remembered of the way behind: farther back nobody backs
 NO_ROAD_S: Final = 10.0  # stood so long without a road ahead: by then the search takes the least room
+AGAIN_S: Final = 5.0  # later an attempt that found no room is made again
 FAR_M: Final = 30.0  # driven since the last attempt: what is met there is something new
 ATTEMPTS: Final = 8  # at one place: after that it stands, and says so
 BACK_M: Final = (4.0, 8.0, 6.0)  # backed off at the first attempts
+BEHIND_M: Final = 2.0  # with somebody so near behind, nobody backs off
 TURNS_FROM: Final = 2  # attempts that only back off
 FLIPS_AT: Final = 2  # the attempt after which the next side street is passed
 OBSTACLE_M: Final = 15.0  # who stands nearer ahead bars the street
@@ -64,6 +66,7 @@ class Escape:
         self._known = False  # whether the manoeuvre was begun with a fix
         self._attempts, self._since_m = 0, math.inf
         self._moved = (0.0, 0.0)
+        self._again_s = NO_ROAD_S
         self.passes_side_street = False  # the search is to go straight on the next time
 
     @property
@@ -100,14 +103,19 @@ class Escape:
             return self.step(radar, dt_s)
         return None
 
-    def no_road(self, stood_s: float, waits: bool) -> bool:
-        """Whether the search, which has stood so long because of the road itself, is to be left for a manoeuvre that begins."""
-        if stood_s < NO_ROAD_S or waits or self._attempts_left() <= 0:
+    def no_road(self, stood_s: float, waits: bool, radar: Radar) -> bool:
+        """Whether a manoeuvre begins, as the search has stood so long because of the road itself, and not because it waits."""
+        if stood_s < NO_ROAD_S:
+            self._again_s = NO_ROAD_S
+        if waits or stood_s < self._again_s or self._attempts_left() <= 0:
             return False
+        self._again_s = stood_s + AGAIN_S
         back_m = BACK_M[min(self._attempts, len(BACK_M) - 1)]
         turns = self._attempts >= TURNS_FROM
         self._attempts += 1
         self.passes_side_street ^= self._attempts == FLIPS_AT
+        if radar.gap_behind_m < BEHIND_M:
+            return self._turn(math.inf)
         return self._back(back_m, math.inf if turns else None)
 
     def barred(self, gap_m: float) -> bool:

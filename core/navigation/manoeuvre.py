@@ -33,6 +33,8 @@ WHEELS_RAD: Final = 0.03  # of the angle that they are to have
 KEPT_M: Final = 0.8  # from whom the radar sees ahead or behind
 HELD_UP_S: Final = 6.0  # so long before somebody, a leg ends where it is
 CALM_M: Final = 25.0  # nobody who moves is nearer ..
+LEAST_CALM_M: Final = 10.0  # on a busy street one goes at last when there is so much, ..
+IMPATIENT_MPS: Final = 0.5  # .. for what is wanted shrinks as one waits
 CALM_S: Final = 1.5  # .. for so long, before the vehicle goes across the road
 LOOK_M: Final = 0.25  # beyond where it would stop, a leg is looked at as it is driven
 MOST_LEGS: Final = 16  # of a turn, however often it is planned anew
@@ -85,13 +87,15 @@ class Turn:
         self._replan, self._legs, self._state, self._vehicle = replan, legs, state, vehicle
         self._indicator = Indicator.LEFT if sum(leg.turned_rad for leg in legs) > 0.0 else Indicator.RIGHT
         self._driven_m = self._turned_rad = self._calm_s = self._held_up_s = 0.0
-        self._begun, self._count = False, 0
+        self._begun, self._count, self._waited_s = False, 0, 0.0
 
     def step(self, now: Sensed) -> Command | None:
         """The next command; None once the vehicle has turned round, or has failed to."""
         motion, radar, dt_s = now.motion, now.radar, now.dt_s
         if not self._begun:
-            self._calm_s = self._calm_s + dt_s if radar.moving_m > CALM_M and not radar.blind else 0.0
+            self._waited_s += dt_s
+            calm_m = max(CALM_M - IMPATIENT_MPS * self._waited_s, LEAST_CALM_M)
+            self._calm_s = self._calm_s + dt_s if radar.moving_m > calm_m and not radar.blind else 0.0
             self._begun = self._calm_s >= CALM_S
             return self._standing(motion.steering_rad, True, "waits until nobody is near, to turn round")
         self._driven_m, self._turned_rad = self._driven_m + now.distance_m, self._turned_rad + now.turned_rad

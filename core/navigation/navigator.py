@@ -38,6 +38,7 @@ __all__ = ["Navigator", "NavigatorConfig", "PoseSource"]
 
 BLOCKED = "the street is blocked"
 NO_ROOM = "no way leads on, and there is no room to turn round"
+AGAIN_S = 5.0  # later it is tried again to turn round where there was no room
 STANDING_MPS = 0.1
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
 OBSTACLE_M = 10.0  # who stands nearer than this before something waits for it
@@ -185,7 +186,7 @@ class Navigator:
             config.drive,
             config.vehicle,
         )
-        if self._escape.no_road(self._search_stood_s, not step.may_creep):
+        if self._escape.no_road(self._search_stood_s, not step.may_creep, radar):
             self._search_stood_s = 0.0
         accel = min(
             approach_mps2(speed, step.speed_mps, config.drive), following_mps2(speed, radar, config.drive, config.vehicle)
@@ -242,8 +243,7 @@ class Navigator:
         plan, track = self._belief.plan, self._belief.track
         gate = None if plan is None else plan.gate()
         if plan is None or track is None:
-            if self._escape.barred(radar.gap_m):
-                self._standing_s = 0.0
+            self._standing_s = 0.0 if self._escape.barred(radar.gap_m) else self._standing_s - AGAIN_S
         elif gate is not None and gate.edge >= 0 and gate.entry_u_m - plan.u_m < OBSTACLE_M + self._config.vehicle.front_m:
             self._standing_s = 0.0
             self._planner.close(gate.edge)
@@ -251,9 +251,9 @@ class Navigator:
             if self._belief.plan is None:
                 self._planner.open_all()
         elif self._standing_s >= self._config.drive.turns_round_s and self._planner.close_own(track.pose):
-            if self._escape.barred(radar.gap_m):
-                self._standing_s = 0.0
-            else:
+            begins = self._escape.barred(radar.gap_m)
+            self._standing_s = 0.0 if begins else self._config.drive.blocked_s
+            if not begins:
                 self._planner.open_all()
 
     def _standing(self, state: DrivingState, reason: str) -> Command:

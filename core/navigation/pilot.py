@@ -59,7 +59,7 @@ class RoutePlanner:
         )
         self._goal: LanePlace | None = None
         self._to_goal: TimesToGoal | None = None
-        self._opposite = opposite_lanes(self.roads)
+        self._opposite: tuple[int, ...] = ()  # found when it is first asked for
         self.closed: frozenset[int] = frozenset()
 
     def set_goal(self, goal: Goal) -> None:
@@ -114,6 +114,7 @@ class RoutePlanner:
         """The plan to where the vehicle turns round in the street, where no way leads to the goal without."""
         assert self._goal is not None
         config, goal = self._config.plan, self._goal
+        self._opposite = self._opposite or opposite_lanes(self.roads)
         times = times_to_goal(self._times, goal.lane, goal.position_m, self.closed, config, self._opposite)
         found = place_to_turn(self._times, times, place.lane, place.position_m, self._opposite, config)
         if found is None:

@@ -55,11 +55,16 @@ def opposite_lane(roads: RoadGeometry, pose: FloatArray) -> LanePlace | None:
 
 
 def opposite_lanes(roads: RoadGeometry) -> tuple[int, ...]:
-    """For each lane the one of the opposite direction beside its middle, -1 if there is none."""
+    """For each lane the nearest one of the opposite direction beside its middle, -1 if there is none; none inside junctions."""
+    inside, found = roads.network.is_internal, np.full(roads.network.lane_count, -1, dtype=np.int32)
     lanes = np.arange(roads.network.lane_count, dtype=np.int32)
     middle = poses_on_segments(roads, lanes, 0.5 * roads.lane_length_m)
-    found = (None if roads.network.is_internal[lane] else opposite_lane(roads, middle[lane]) for lane in lanes)
-    return tuple(-1 if place is None else place.lane for place in found)
+    near = project(roads, middle[:, :2], OPPOSITE_M)
+    off = np.abs(wrap(near.heading_rad - middle[near.point, 2] - math.pi))
+    rows = np.flatnonzero((off < SAME_WAY_RAD) & ~inside[near.lane] & ~inside[near.point])
+    rows = rows[np.argsort(-near.distance_m[rows], kind="stable")]
+    found[near.point[rows]] = near.lane[rows]  # of several, the last one counts: the nearest
+    return tuple(found.tolist())
 
 
 def place_beside(roads: RoadGeometry, pose: FloatArray, lane: int, position_m: float) -> LanePlace:

@@ -10,7 +10,7 @@ from hippodrome.core.navigation.config import NavigatorConfig, VehicleShape
 from hippodrome.core.navigation.navigator import Navigator
 from hippodrome.core.navigation.turning import Clearance, Leg, is_clear, plan_turn, poses_along
 from hippodrome.core.navigation.types import DrivingState, Goal, Radar
-from tests.core.navigation.roads import GREY, Bicycle, map_along, street
+from tests.core.navigation.roads import GREY, Bicycle, arc, map_along, network_of, street
 
 VEHICLE = VehicleShape()
 
@@ -97,24 +97,46 @@ def test_it_turns_round_where_the_goal_lies_behind_it_and_no_way_leads_there(wid
     assert is_clear(rows[:, :3], room, VEHICLE, Clearance(0.05, -0.3)).all()
 
 
-def test_before_a_barrier_in_the_street_it_turns_round_after_a_while():
-    network = street(onward=True)
-    navigator, car = started(network, (20.0, -1.6, 0.0), Goal(70.0, -1.6, 0.0))
-    barrier_m = 60.0
+def closed_street():
+    """Lane 0 leads east to lane 2, which holds the goal; lane 1 leads back west, and by a long way round to lane 2."""
+    r = 8.0
+    lines = [
+        [(0.0, -1.6), (80.0, -1.6)], [(80.0, 1.6), (0.0, 1.6)], [(80.0, -1.6), (140.0, -1.6)],
+        arc((0.0, 1.6 + r), r, 270, 180), [(-r, 1.6 + r), (-r, 42.0)], arc((0.0, 42.0), r, 180, 90),
+        [(0.0, 42.0 + r), (60.0, 42.0 + r)], arc((60.0, 42.0), r, 90, 0), [(60.0 + r, 42.0), (60.0 + r, 6.4)],
+        arc((68.0 + r, 6.4), r, 180, 270),
+    ]  # fmt: skip
+    return network_of(lines, [(0, 2), (1, 3), (3, 4), (4, 5), (5, 6), (6, 7), (7, 8), (8, 9), (9, 2)])
 
+
+def barrier(at_m):
     def radar(car):
-        gap = barrier_m - car.pose[0] - 3.6 if math.cos(car.pose[2]) > 0.7 else math.inf
-        return Radar(max(gap, 0.0), car.speed)
+        ahead = at_m - car.pose[0] - 3.6 if math.cos(car.pose[2]) > 0.7 and abs(car.pose[1] + 1.6) < 1.5 else math.inf
+        return Radar(ahead, car.speed) if ahead >= 0.0 else Radar()
 
-    command, _, rows = drive(navigator, car, 60.0, radar)
-    assert command.state is DrivingState.HALTED  # the goal lies beyond it, and no other way leads there
-    assert np.hypot(rows[-1, 0] - rows[100, 0], rows[-1, 1] + 1.6) < 40.0
+    return radar
+
+
+def test_before_a_barrier_in_the_street_it_turns_round_after_a_while_and_comes_by_another_way():
+    navigator, car = started(closed_street(), (10.0, -1.6, 0.0), Goal(120.0, -1.6, 0.0))
+    command, reasons, rows = drive(navigator, car, 60.0, barrier(50.0))
+    assert "turns round" in reasons and rows[:, 0].max() < 50.0 - 3.6
+    command, *_ = drive(navigator, car, 150.0, barrier(50.0))
+    assert command.state is DrivingState.ARRIVED
+    assert car.pose[:2] == pytest.approx([120.0, -1.6], abs=1.0)
+
+
+def test_before_a_barrier_with_no_way_round_it_halts():
+    navigator, car = started(street(), (20.0, -1.6, 0.0), Goal(70.0, -1.6, 0.0))
+    command, reasons, _ = drive(navigator, car, 70.0, barrier(60.0))
+    assert command.state is DrivingState.HALTED and "blocked" in command.reason
+    assert "turns round" not in reasons and car.speed == 0.0
 
 
 def test_it_waits_until_nobody_moves_near():
     network = street()
     navigator, car = started(network, (20.0, -1.6, 0.0), Goal(-20.0, 1.6, math.pi))
-    command, _, rows = drive(navigator, car, 30.0, lambda car: Radar(moving_m=10.0))
+    command, _, rows = drive(navigator, car, 30.0, lambda car: Radar(moving_m=9.0))
     assert command.reason.startswith("waits until nobody") and abs(rows[-1, 2]) < 0.05
     command, *_ = drive(navigator, car, 90.0, lambda car: Radar())
     assert command.state is DrivingState.ARRIVED

@@ -38,11 +38,13 @@ CLEARANCES: Final[tuple[Clearance, ...]] = (
     Clearance(0.2, 0.0),
     Clearance(0.12, -0.25),
 )  # of several the best that there is room for
-TIGHT: Final[tuple[Clearance, ...]] = (
-    Clearance(0.2, 0.0),
-    Clearance(0.1, -0.25),
-)  # on ground that was seen, whose borders err to the narrow side
+ON_SIGHT: Final[tuple[Clearance, ...]] = (
+    Clearance(0.5, 0.2),
+    Clearance(0.3, 0.0),
+    Clearance(0.15, -0.25),
+)  # borders seen are rough
 LEAST: Final = Clearance(0.05, -0.4)  # a leg that would leave less than this ends early
+SURE_M: Final = 1.5  # standard deviation of the place from which on the ground that was seen counts, and not the network's
 WIDEST_M: Final = 8.0  # from the vehicle to the far border: a wider road is turned round in with what it needs
 ASIDE_STEP_M: Final = 0.1
 
@@ -149,14 +151,14 @@ class Escape:
     def _turn(self, gap_m: float) -> bool:
         """Begin to turn round, if there is room; ``gap_m`` is that to something that bars the street."""
         self._turn_next, track = None, self._belief.track
-        self._known = track is not None
         place = None if track is None else self._planner.opposite(track.pose)
         if track is not None and place is None:
             return False
-        if track is not None and place is not None:
+        self._known = track is not None and track.sigma_m < SURE_M
+        if self._known and track is not None and place is not None:
             room, line, clearances = room_on_roads(self._planner.roads, track.pose), place, CLEARANCES
         else:
-            room, clearances = room_on_seen_ground(self._senses.ground), TIGHT
+            room, clearances = room_on_seen_ground(self._senses.ground), ON_SIGHT
             line = _far_lane(room, self._senses.ground.pose, self._side, self._senses.memory.beside_m)
         if gap_m < OBSTACLE_M:
             room = before_obstacle(room, self._pose(), self._config.vehicle.front_m + gap_m - OBSTACLE_KEPT_M)

@@ -140,3 +140,17 @@ def test_it_waits_until_nobody_moves_near():
     assert command.reason.startswith("waits until nobody") and abs(rows[-1, 2]) < 0.05
     command, *_ = drive(navigator, car, 90.0, lambda car: Radar())
     assert command.state is DrivingState.ARRIVED
+
+
+def test_a_search_that_stands_backs_off_and_spaces_its_attempts(monkeypatch):
+    navigator, car = started(street(), (20.0, -1.6, 0.0), Goal(70.0, -1.6, 0.0))
+    drive(navigator, car, 4.0, lambda car: Radar())
+    escape, crowded = navigator._escape, Radar(gap_behind_m=0.5)
+    assert not escape.no_road(5.0, False, Radar()) and not escape.no_road(12.0, True, Radar())
+    monkeypatch.setattr(escape, "_turn", lambda gap_m: False)  # no room for it
+    tried = [k for k in range(100, 400) if escape.no_road(0.1 * k, False, crowded) or escape._again_s == 0.1 * k + 5.0]
+    assert tried[:3] == [100, 150, 200]
+    assert not escape.is_under_way
+    assert escape.no_road(41.0, False, Radar()) and escape.is_under_way
+    command = escape.step(Radar(), 0.1)
+    assert command.reverse and command.reason == "backs off"

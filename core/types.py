@@ -62,7 +62,8 @@ class Observation(ShortRepr):
     Args:
         t_s: time at the end of the interval, seconds, on any clock that does not jump.
         dt_s: length of the interval, seconds, positive.
-        speed: mean forward speed over the interval, map units per second. Metres per map unit may be unknown and may drift.
+        speed: mean forward speed over the interval, map units per second, negative where the vehicle drove backwards. Metres per
+            map unit may be unknown and may drift.
         yaw_rate_radps: mean yaw rate over the interval, counter-clockwise positive.
         frame: camera frame taken at ``t_s``: (H, W, 3) RGB or (H, W) grey, 8 bits; None where the camera took none.
 

@@ -48,12 +48,22 @@ def radar_message(radar: Radar) -> pb.Radar:
         way_is_free=radar.way_is_free,
         lamp=int(radar.lamp),
         blind=radar.blind,
+        gap_behind_m=radar.gap_behind_m,
+        moving_m=radar.moving_m,
     )
 
 
 def radar_of(message: pb.Radar) -> Radar:
     """The radar of a message."""
-    return Radar(message.gap_m, message.closing_mps, message.way_is_free, Lamp(message.lamp), message.blind)
+    return Radar(
+        message.gap_m,
+        message.closing_mps,
+        message.way_is_free,
+        Lamp(message.lamp),
+        message.blind,
+        message.gap_behind_m,
+        message.moving_m,
+    )
 
 
 def goal_of(message: pb.Pose) -> Goal:
@@ -71,6 +81,7 @@ def command_message(command: Command) -> pb.Command:
         indicator=INDICATORS[Indicator(command.indicator)],
         state=int(command.state),  # type: ignore[arg-type]
         reason=command.reason,
+        reverse=command.reverse,
     )
 
 
@@ -84,7 +95,7 @@ def command_of(message: pb.Command) -> Command:
         state = DrivingState(message.state)
     except (KeyError, ValueError):
         raise HippodromeError(f"it sent indicator {message.indicator} and state {message.state}, which are unknown") from None
-    return Command(*numbers, indicator, state, message.reason[:MOST_REASON])
+    return Command(*numbers, indicator, state, message.reason[:MOST_REASON], message.reverse)
 
 
 def lane_messages(roads: RoadNetwork) -> Iterator[pb.Lane]:

@@ -159,7 +159,7 @@ class Localizer:
         """
         config, believed = self._config, self._believed_cells()
         match = self._recogniser.recognise(frame, self._since_query, believed)
-        weight = 1.0 if self._match is None else min(1.0, self._since_query.length / config.independent_m)
+        weight = 1.0 if self._match is None else min(1.0, abs(self._since_query.length) / config.independent_m)
         self._match, self._since_query = match, NOT_MOVED
         self._view_change = keyframes.restart(self._view_change)
         self._fix = faded(self._fix, config)

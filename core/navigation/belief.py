@@ -48,6 +48,7 @@ class Belief:
         self.track: Track | None = None  # None without a fix
         self.since_fix_m = 0.0
         self.plan: Plan | None = None  # given up with the pose that it was made for
+        self.turns_round = False  # across the road no lane is read, and no path lies ahead
         self._since_look_s = 0.0
         self._apart_looks = self._vouched = 0
         self._misfits = self._off_road = 0
@@ -76,7 +77,7 @@ class Belief:
             self.track = tracks.moved(self.track, distance_m, turned_rad)
         if self._refuted is not None:
             self._refuted = tracks.moved(self._refuted, distance_m, turned_rad)
-        self.since_fix_m += distance_m
+        self.since_fix_m += abs(distance_m)
 
     def _take_over(self, estimate: LocalizationEstimate) -> None:
         """Steer by the very pose that was told."""
@@ -91,7 +92,7 @@ class Belief:
         if estimate.status is not LocalizationStatus.LOCALIZED or self._is_refuted(estimate, distance_m):
             self._on_map_m, self._vouched = 0.0, 0
             return  # off the map the localizer has dead reckoning alone, and here there are lanes and dashes beside it
-        self._on_map_m += distance_m
+        self._on_map_m += abs(distance_m)
         recognised = estimate.confidence >= self._config.localizer.margin
         self._since_look_s, looked = (self._since_look_s + dt_s, False) if self._since_look_s < LOOK_EVERY_S else (0.0, True)
         self._vouched += int(looked and recognised and distance_m > 0.0)
@@ -124,7 +125,7 @@ class Belief:
         """Whether the localizer still says what was seen to be wrong."""
         if self._refuted is None:
             return False
-        self._refuted_m += distance_m
+        self._refuted_m += abs(distance_m)
         apart_m = float(np.hypot(*(estimate.pose[:2] - self._refuted.pose[:2])))
         if apart_m > APART_M or self._refuted_m > REFUTED_M:
             self._refuted = None
@@ -142,7 +143,7 @@ class Belief:
         if self.plan is not None:
             self.plan = advanced(self.plan, self.track.pose)
         reading = senses.reading
-        if observation.frame is None or observation.speed == 0.0:
+        if observation.frame is None or observation.speed <= 0.0 or self.turns_round:
             return
         self._check_by_sight(estimate, senses)
         if reading is None or self.track is None:

@@ -30,6 +30,9 @@ class PlanConfig:
     change_s: float = 4.0  # a lane change is avoided if that costs less
     change_room_m: float = 28.0  # a lane change needs so much road
     u_turn_s: float = 25.0  # turning round where the road ends
+    turn_round_s: float = 40.0  # turning round in the street, to and fro; planned only where no other way is
+    turn_stop_mps2: float = 1.2  # braking towards where it is done
+    turn_room_m: float = 15.0  # from the beginning of a street to where one turns round in it, clear of the junction
     unmapped_factor: float = 1.6  # roads without views are driven by dead reckoning: half as fast, and the fix fades there
     mapped_within_m: float = 12.0  # a lane is mapped where a vertex lies this close along it
     backward_m: float = 6.0  # the path begins so far behind the vehicle, so that its first bend is smooth
@@ -62,6 +65,7 @@ class DriveConfig:
     goal_sigma_m: float = 1.5  # an arrival is said only if the position is known this well: twice that is the goal's 3 m
     settled_m: float = 30.0  # and if the fix has held over this distance
     blocked_s: float = 25.0  # standing so long before an obstacle, and not at a red light, the road counts as closed
+    turns_round_s: float = 30.0  # and so long before one in the street itself, the vehicle turns round
 
 
 @dataclass(frozen=True)

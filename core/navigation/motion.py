@@ -35,7 +35,7 @@ SPEED_TRUST = 0.25  # weight of one speed measurement: its noise is 6 % at 10 Hz
 class Motion:
     """What is known of the vehicle's motion."""
 
-    speed_mps: float = 0.0
+    speed_mps: float = 0.0  # negative backwards
     steering_rad: float = 0.0  # where the road wheels stand, as they were told to
     seen_m: float = 0.0  # sums over the drive: metres seen to pass, and units by the odometry meanwhile
     seen_units: float = 0.0
@@ -84,7 +84,7 @@ def sensed(motion: Motion, observation: Observation, metres_per_unit: float, veh
         turned = MEMORY * turned + observation.yaw_rate_radps * dt_s * bend * units
         turning = MEMORY * turning + (bend * units) ** 2
         turned_rad = min(turned_rad + abs(observation.yaw_rate_radps) * dt_s, 1.0)
-    return replace(motion, speed_mps=max(smooth, 0.0), turned=turned, turning=turning, turned_rad=turned_rad)
+    return replace(motion, speed_mps=smooth, turned=turned, turning=turning, turned_rad=turned_rad)
 
 
 def seen(motion: Motion, metres: float, units: float) -> Motion:
@@ -97,11 +97,20 @@ def unseen(motion: Motion) -> Motion:
     return replace(motion, seen_m=0.0, seen_units=0.0)
 
 
-def commanded(motion: Motion, acceleration_mps2: float, steering_rad: float, dt_s: float) -> Motion:
-    """The motion as a command makes it: the wheels turn as fast as they can, the speed changes as it was told to."""
+def commanded(motion: Motion, acceleration_mps2: float, steering_rad: float, dt_s: float, reverse: bool = False) -> Motion:
+    """The motion as a command makes it: the wheels turn as fast as they can, the speed changes as it was told to.
+
+    Accelerations are along the gear; a vehicle that rolls the other way brakes first.
+    """
     most = WHEEL_RATE_RADPS * dt_s
     wheels = motion.steering_rad + min(max(steering_rad - motion.steering_rad, -most), most)
-    return replace(motion, speed_mps=max(motion.speed_mps + acceleration_mps2 * dt_s, 0.0), steering_rad=wheels)
+    gear = -1.0 if reverse else 1.0
+    along = gear * motion.speed_mps
+    if along < 0.0:
+        along = min(along + abs(acceleration_mps2) * dt_s, 0.0)
+    else:
+        along = max(along + acceleration_mps2 * dt_s, 0.0)
+    return replace(motion, speed_mps=gear * along, steering_rad=wheels)
 
 
 def told(motion: Motion, metres_per_unit: float, distance_m: float) -> Motion:
@@ -110,5 +119,6 @@ def told(motion: Motion, metres_per_unit: float, distance_m: float) -> Motion:
     if math.isnan(motion.told):
         return replace(motion, told=new)
     share = TOLD_PER_M if motion.told_m > 2.0 * SETTLED_M else TOLD_AT_FIRST_PER_M
-    smooth = motion.told + min(share * distance_m, 1.0) * (new - motion.told)
-    return replace(motion, told=smooth, told_m=motion.told_m + distance_m)
+    far_m = abs(distance_m)
+    smooth = motion.told + min(share * far_m, 1.0) * (new - motion.told)
+    return replace(motion, told=smooth, told_m=motion.told_m + far_m)

@@ -21,6 +21,7 @@ from hippodrome.core.navigation import motion as motions
 from hippodrome.core.navigation.belief import Belief
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.driving import BARRED, pace
+from hippodrome.core.navigation.escape import Escape
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, is_missed
 from hippodrome.core.navigation.placing import keeps_left, lane_of
 from hippodrome.core.navigation.searching import search_step
@@ -35,7 +36,9 @@ from hippodrome.core.types import CognitiveMap, LocalizationEstimate, Localizati
 
 __all__ = ["Navigator", "NavigatorConfig", "PoseSource"]
 
-BLOCKED = "the street is blocked, and it cannot turn round in it"
+BLOCKED = "the street is blocked"
+NO_ROOM = "no way leads on, and there is no room to turn round"
+AGAIN_S = 5.0  # later it is tried again to turn round where there was no room
 STANDING_MPS = 0.1
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
 OBSTACLE_M = 10.0  # who stands nearer than this before something waits for it
@@ -87,6 +90,7 @@ class Navigator:
         self._side = 1.0 if keeps_left(self._planner.roads) else -1.0
         self._senses = Senses(config, self._side, self._localizer.metres_per_unit)
         self._belief = Belief(config, self._planner, self._side)
+        self._escape = Escape(config, self._senses, self._belief, self._planner, self._side)
         self._health = SensorHealth()
         self._has_goal = False
         self._standing_s = self._at_goal_s = self._search_stood_s = self._searched_m = 0.0
@@ -121,8 +125,10 @@ class Navigator:
         is_known = self.estimate.localized and self.estimate.status is LocalizationStatus.LOCALIZED
         distance_m = senses.step(observation, radar, self._localizer.metres_per_unit if is_known else None)
         self._belief.step(observation, self.estimate, distance_m, senses)
+        self._escape.moved(distance_m, observation.yaw_rate_radps * dt_s)
         command = self._decide(radar, dt_s)
-        senses.motion = motions.commanded(senses.motion, command.acceleration_mps2, command.steering_rad, dt_s)
+        accel, wheel, reverse = command.acceleration_mps2, command.steering_rad, command.reverse
+        senses.motion = motions.commanded(senses.motion, accel, wheel, dt_s, reverse)
         return command
 
     def _decide(self, radar: Radar, dt_s: float) -> Command:
@@ -132,16 +138,20 @@ class Navigator:
             return self._standing(DrivingState.HALTED, "has no goal")
         if self._arrived:
             return self._standing(DrivingState.ARRIVED, "has arrived")
-        self._keep_plan()
-        command = self._searching(radar, dt_s) if self._belief.plan is None else self._driving(radar, dt_s)
+        command = self._escape.step(radar, dt_s)
+        if command is None:
+            self._keep_plan()
+            command = self._searching(radar, dt_s) if self._belief.plan is None else self._driving(radar, dt_s)
+        speed = abs(self._senses.motion.speed_mps)
         if complaint:
             limit = 0.0 if halt else self._config.drive.search_mps / 2.0
-            slowed = min(command.acceleration_mps2, self._config.drive.speed_gain_1ps * (limit - self._senses.motion.speed_mps))
-            if halt and self._senses.motion.speed_mps < STANDING_MPS:
+            slowed = min(command.acceleration_mps2, self._config.drive.speed_gain_1ps * (limit - speed))
+            if halt and speed < STANDING_MPS:
                 slowed = HOLD_MPS2
             state = DrivingState.HALTED if halt else DrivingState.DOUBTING
             command = replace(command, acceleration_mps2=max(slowed, -3.0), state=state, reason=complaint)
-        self._look_for_blockage(radar, command.reason == BARRED, dt_s)
+        if not self._escape.is_under_way:
+            self._look_for_blockage(radar, command.reason == BARRED, dt_s)
         if self._standing_s >= self._config.drive.blocked_s and command.state in (DrivingState.DRIVING, DrivingState.DOUBTING):
             return replace(command, state=DrivingState.HALTED, reason=BLOCKED)
         return command
@@ -162,7 +172,7 @@ class Navigator:
         self._searched_m += speed * dt_s
         self._search_stood_s = self._search_stood_s + dt_s if speed < STANDING_MPS else max(self._search_stood_s - dt_s, 0.0)
         bend = math.tan(self._senses.motion.steering_rad) / config.vehicle.wheelbase_m
-        straight_on = int(self._searched_m / ROUND_M) % 2 == 1
+        straight_on = (int(self._searched_m / ROUND_M) % 2 == 1) != self._escape.passes_side_street
         step = search_step(
             self._senses.ground,
             self._senses.memory,
@@ -176,6 +186,8 @@ class Navigator:
             config.drive,
             config.vehicle,
         )
+        if self._escape.no_road(self._search_stood_s, not step.may_creep, radar):
+            self._search_stood_s = 0.0
         accel = min(
             approach_mps2(speed, step.speed_mps, config.drive), following_mps2(speed, radar, config.drive, config.vehicle)
         )
@@ -193,7 +205,7 @@ class Navigator:
             if config.drive.doubt_mps < wanted:
                 wanted, reason = config.drive.doubt_mps, "doubts its place"
         if plan.to_goal_m < config.drive.goal_tolerance_m and speed < STANDING_MPS:
-            return self._at_goal(dt_s)
+            return self._to_turn() if plan.turns else self._at_goal(dt_s)
         accel = min(approach_mps2(speed, wanted, config.drive), following_mps2(speed, radar, config.drive, config.vehicle))
         accel = min(accel, stop_mps2(speed, step.to_stop_m, config.drive, config.vehicle))
         if wanted <= 0.0 and speed < STANDING_MPS:
@@ -201,6 +213,12 @@ class Navigator:
         bend = path_curvature_1pm(plan.course, plan.u_m, self._belief.track.pose, speed, config.drive)
         wheel = steering_rad(bend, speed, config.drive, config.vehicle)
         return Command(accel, wheel, step.indicator, state, reason)
+
+    def _to_turn(self) -> Command:
+        """Stands where it is to turn round: begins to, if there is room."""
+        begins = self._escape.barred(math.inf)
+        state, reason = (DrivingState.DRIVING, "turns round") if begins else (DrivingState.HALTED, NO_ROOM)
+        return self._standing(state, reason)
 
     def _at_goal(self, dt_s: float) -> Command:
         """Stands at the goal: says so if the place is known well, and else goes round once more."""
@@ -220,18 +238,22 @@ class Navigator:
         waits = (barred or radar.gap_m < OBSTACLE_M) and radar.lamp not in (Lamp.RED, Lamp.YELLOW) and not radar.blind
         standing = self._senses.motion.speed_mps < STANDING_MPS
         self._standing_s = self._standing_s + dt_s if standing and waits else 0.0
-        if self._belief.plan is None or self._belief.track is None or self._standing_s < self._config.drive.blocked_s:
+        if self._standing_s < self._config.drive.blocked_s:
             return
-        gate = self._belief.plan.gate()
-        if (
-            gate is not None
-            and gate.edge >= 0
-            and gate.entry_u_m - self._belief.plan.u_m < OBSTACLE_M + self._config.vehicle.front_m
-        ):
+        plan, track = self._belief.plan, self._belief.track
+        gate = None if plan is None else plan.gate()
+        if plan is None or track is None:
+            self._standing_s = 0.0 if self._escape.barred(radar.gap_m) else self._standing_s - AGAIN_S
+        elif gate is not None and gate.edge >= 0 and gate.entry_u_m - plan.u_m < OBSTACLE_M + self._config.vehicle.front_m:
             self._standing_s = 0.0
             self._planner.close(gate.edge)
-            self._belief.plan = self._planner.plan(self._belief.track.pose, 0.0)
+            self._belief.plan = self._planner.plan(track.pose, 0.0)
             if self._belief.plan is None:
+                self._planner.open_all()
+        elif self._standing_s >= self._config.drive.turns_round_s and self._planner.close_own(track.pose):
+            begins = self._escape.barred(radar.gap_m)
+            self._standing_s = 0.0 if begins else self._config.drive.blocked_s
+            if not begins:
                 self._planner.open_all()
 
     def _standing(self, state: DrivingState, reason: str) -> Command:

@@ -9,12 +9,21 @@ import numpy as np
 
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.course import Course, Gate, make_course, next_gate, offset_and_turn, place_on
-from hippodrome.core.navigation.placing import LanePlace, lane_of, place_beside
-from hippodrome.core.navigation.routes import RoadTimes, TimesToGoal, mapped_lanes, road_times, route, times_to_goal
+from hippodrome.core.navigation.placing import LanePlace, lane_of, opposite_lane, opposite_lanes, place_beside
+from hippodrome.core.navigation.routes import (
+    RoadTimes,
+    TimesToGoal,
+    mapped_lanes,
+    place_to_turn,
+    road_times,
+    route,
+    time_left_s,
+    times_to_goal,
+)
 from hippodrome.core.navigation.types import Goal
-from hippodrome.core.roads.geometry import RoadGeometry, road_geometry
+from hippodrome.core.roads.geometry import RoadGeometry, poses_on_segments, road_geometry
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.roads.paths import STEP_M
+from hippodrome.core.roads.paths import STEP_M, Piece
 from hippodrome.core.types import CognitiveMap, FloatArray, HippodromeError
 
 OFF_COURSE_M, OFF_COURSE_RAD = 2.5, 1.0  # who is so far off the path has missed it, and plans anew
@@ -27,6 +36,7 @@ class Plan:
 
     course: Course
     u_m: float
+    turns: bool = False  # it ends where the vehicle is to turn round, as no other way leads to the goal
 
     @property
     def to_goal_m(self) -> float:
@@ -49,6 +59,7 @@ class RoutePlanner:
         )
         self._goal: LanePlace | None = None
         self._to_goal: TimesToGoal | None = None
+        self._opposite: tuple[int, ...] = ()  # found when it is first asked for
         self.closed: frozenset[int] = frozenset()
 
     def set_goal(self, goal: Goal) -> None:
@@ -67,6 +78,13 @@ class RoutePlanner:
         """A road on which nobody gets through: plans avoid it from now on."""
         self.closed = self.closed | {edge}
         self._search()
+
+    def close_own(self, pose: FloatArray) -> bool:
+        """Close the road that a pose is on; whether it is on one outside of junctions."""
+        place = lane_of(self.roads, pose, inside=False)
+        if place is not None:
+            self.close(int(self._network.lane_edge[place.lane]))
+        return place is not None
 
     def open_all(self) -> None:
         """Forget which roads are closed."""
@@ -90,9 +108,39 @@ class RoutePlanner:
         if beyond_goal and place.lane == self._goal.lane:
             here_m = max(here_m, self._goal.position_m + 0.1)
         pieces = route(self._times, self._to_goal, place.lane, here_m, speed_mps, self._config.plan)
-        if not pieces:
+        return self._plan_on(pieces, self._goal, place, pose) if pieces else self._plan_to_turn(place, pose, speed_mps)
+
+    def _plan_to_turn(self, place: LanePlace, pose: FloatArray, speed_mps: float) -> Plan | None:
+        """The plan to where the vehicle turns round in the street, where no way leads to the goal without."""
+        assert self._goal is not None
+        config, goal = self._config.plan, self._goal
+        self._opposite = self._opposite or opposite_lanes(self.roads)
+        times = times_to_goal(self._times, goal.lane, goal.position_m, self.closed, config, self._opposite)
+        found = place_to_turn(self._times, times, place.lane, place.position_m, self._opposite, config)
+        if found is None:
             return None
-        goal = self._goal
+        lane, length_m = found[0], float(self.roads.lane_length_m[found[0]])
+        braking_m = speed_mps**2 / (2.0 * config.turn_stop_mps2) + self._config.drive.goal_tolerance_m
+        wanted_m = place.position_m + braking_m if lane == place.lane else config.turn_room_m
+        stop_m = max(min(wanted_m, length_m - 0.5), 0.5 * length_m if lane != place.lane else min(place.position_m, length_m))
+        stop = place_beside(self.roads, pose, lane, stop_m)
+        there = times_to_goal(self._times, lane, stop_m, frozenset(), config)
+        pieces = route(self._times, there, place.lane, place.position_m, speed_mps, config)
+        plan = self._plan_on(pieces, stop, place, pose) if pieces else None
+        return None if plan is None else replace(plan, turns=True)
+
+    def opposite(self, pose: FloatArray) -> FloatArray | None:
+        """The pose (3,) on the lane of the opposite direction beside a pose, if a way leads from there to the goal."""
+        place = opposite_lane(self.roads, pose)
+        if place is None or self._to_goal is None:
+            return None
+        if not math.isfinite(time_left_s(self._times, self._to_goal, place.lane, place.position_m)):
+            return None
+        there: FloatArray = poses_on_segments(self.roads, np.array([place.lane]), np.array([place.position_m]))[0]
+        return there
+
+    def _plan_on(self, pieces: list[Piece], goal: LanePlace, place: LanePlace, pose: FloatArray) -> Plan:
+        """The plan over the stretches of lanes of a route."""
         course = make_course(self._network, pieces, goal.lane, goal.position_m, self._config.drive, self._config.vehicle)
         u_m = place.position_m - pieces[0].begin_m if pieces[0].lane == place.lane else 0.0
         return Plan(course, place_on(course, pose, min(max(u_m, 0.0), course.last_u_m)))

@@ -15,6 +15,7 @@ from hippodrome.core.types import FloatArray
 NEAR_M = 6.0  # lanes farther away are not looked at
 SAME_WAY_RAD = math.radians(50.0)
 FARTHEST_M = 3.5  # a vehicle farther from every lane's middle is on none of them
+OPPOSITE_M = 8.0  # to the lane of the opposite direction: two lanes aside
 METRES_PER_RAD = 4.0  # what an angle to a lane counts against a distance from it
 INTERNAL_M = 1.0  # by which ways through junctions count as farther away: they overlap, and roads are surer
 
@@ -40,6 +41,30 @@ def lane_of(roads: RoadGeometry, pose: FloatArray, inside: bool = True) -> LaneP
         return None
     best = int(np.argmin(cost))
     return place_beside(roads, pose, int(near.lane[best]), float(near.position_m[best]))
+
+
+def opposite_lane(roads: RoadGeometry, pose: FloatArray) -> LanePlace | None:
+    """The nearest lane of the opposite direction beside a pose (3,), outside of junctions; None where there is none."""
+    near = project(roads, pose[None, :2], OPPOSITE_M)
+    off = np.abs(wrap(near.heading_rad - pose[2] - math.pi))
+    fits = (off < SAME_WAY_RAD) & ~roads.network.is_internal[near.lane]
+    if not fits.any():
+        return None
+    best = int(np.argmin(np.where(fits, near.distance_m, np.inf)))
+    return place_beside(roads, pose, int(near.lane[best]), float(near.position_m[best]))
+
+
+def opposite_lanes(roads: RoadGeometry) -> tuple[int, ...]:
+    """For each lane the nearest one of the opposite direction beside its middle, -1 if there is none; none inside junctions."""
+    inside, found = roads.network.is_internal, np.full(roads.network.lane_count, -1, dtype=np.int32)
+    lanes = np.arange(roads.network.lane_count, dtype=np.int32)
+    middle = poses_on_segments(roads, lanes, 0.5 * roads.lane_length_m)
+    near = project(roads, middle[:, :2], OPPOSITE_M)
+    off = np.abs(wrap(near.heading_rad - middle[near.point, 2] - math.pi))
+    rows = np.flatnonzero((off < SAME_WAY_RAD) & ~inside[near.lane] & ~inside[near.point])
+    rows = rows[np.argsort(-near.distance_m[rows], kind="stable")]
+    found[near.point[rows]] = near.lane[rows]  # of several, the last one counts: the nearest
+    return tuple(found.tolist())
 
 
 def place_beside(roads: RoadGeometry, pose: FloatArray, lane: int, position_m: float) -> LanePlace:

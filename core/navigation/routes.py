@@ -7,7 +7,7 @@ know is driven by dead reckoning, on which the fix fades, and therefore counts f
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 
@@ -77,14 +77,27 @@ def road_times(network: RoadNetwork, mapped: BoolArray, config: PlanConfig) -> R
     return RoadTimes(network, length_m, time_s + config.u_turn_s * turns_back, tuple(tuple(lanes) for lanes in before))
 
 
-def times_to_goal(roads: RoadTimes, goal_lane: int, goal_m: float, closed: Collection[int], config: PlanConfig) -> TimesToGoal:
-    """Search back from the goal. ``closed`` are edges (indices into ``edge_ids``) on which nobody gets through."""
+def times_to_goal(
+    roads: RoadTimes,
+    goal_lane: int,
+    goal_m: float,
+    closed: Collection[int],
+    config: PlanConfig,
+    opposite: Sequence[int] | None = None,
+) -> TimesToGoal:
+    """Search back from the goal. ``closed`` are edges (indices into ``edge_ids``) on which nobody gets through.
+
+    With the lane of the opposite direction beside each lane, -1 if there is none, turning round in the street is a way, too.
+    """
     network = roads.network
     shut = np.isin(network.lane_edge, np.array(sorted(closed), dtype=np.int32))
     from_begin = np.full(network.lane_count, np.inf)
     share = goal_m / max(float(roads.length_m[goal_lane]), SHORTEST_M)
     from_begin[goal_lane] = roads.time_s[goal_lane] * share
     heap = [(float(from_begin[goal_lane]), goal_lane)]
+    if opposite is not None and opposite[goal_lane] >= 0:
+        from_begin[opposite[goal_lane]] = config.turn_round_s + float(from_begin[goal_lane])
+        heappush(heap, (float(from_begin[opposite[goal_lane]]), opposite[goal_lane]))
     while heap:
         time_s, lane = heappop(heap)
         if time_s > from_begin[lane]:
@@ -92,6 +105,8 @@ def times_to_goal(roads: RoadTimes, goal_lane: int, goal_m: float, closed: Colle
         steps = [(other, float(roads.time_s[other])) for other in roads.before[lane] if not shut[other]]
         if roads.length_m[lane] >= config.change_room_m:
             steps += [(other, config.change_s) for other in network.adjacent_lanes(lane) if not shut[other]]
+        if opposite is not None:  # from the beginning of a lane onto the end of the opposite one, which leads to this one
+            steps += [(opposite[other], config.turn_round_s) for other in roads.before[lane] if opposite[other] >= 0]
         for other, cost_s in steps:
             if other != goal_lane and time_s + cost_s < from_begin[other]:
                 from_begin[other] = time_s + cost_s
@@ -99,6 +114,25 @@ def times_to_goal(roads: RoadTimes, goal_lane: int, goal_m: float, closed: Colle
     from_end = np.array([min((from_begin[i] for i in network.successors(k).tolist()), default=np.inf)
                          for k in range(network.lane_count)])  # fmt: skip
     return TimesToGoal(goal_lane, goal_m, from_begin, from_end)
+
+
+def place_to_turn(
+    roads: RoadTimes, times: TimesToGoal, lane: int, position_m: float, opposite: Sequence[int], config: PlanConfig
+) -> tuple[int, float] | None:
+    """Where the quickest way of those with a turn in the street has its first one; None where none leads to the goal."""
+    for _ in range(MOST_PIECES):
+        length_m, go_on_s = float(roads.length_m[lane]), float(times.from_end_s[lane])
+        rest_s = float(roads.time_s[lane]) * max(length_m - position_m, 0.0) / max(length_m, SHORTEST_M)
+        if (other := opposite[lane]) >= 0:
+            there_m = max(float(roads.length_m[other]) - position_m, 0.0)
+            turned_s = config.turn_round_s + time_left_s(roads, times, other, there_m)
+            if math.isfinite(turned_s) and turned_s <= rest_s + go_on_s:
+                return lane, position_m
+        after = roads.network.successors(lane)
+        if not math.isfinite(go_on_s) or not len(after):
+            return None
+        lane, position_m = int(after[np.argmin(times.from_begin_s[after])]), 0.0
+    return None
 
 
 def time_left_s(roads: RoadTimes, times: TimesToGoal, lane: int, position_m: float) -> float:

@@ -72,7 +72,7 @@ def remembered(
     ``border_m`` is the distance to the border on the own ``side`` in the ground's map, nan where none is known.
     """
     heading = memory.heading_rad + turned_rad - memory.curvature_1pm * distance_m
-    offset, since = memory.offset_m + distance_m * math.sin(heading), memory.since_m + distance_m
+    offset, since = memory.offset_m + distance_m * math.sin(heading), memory.since_m + abs(distance_m)
     moved = replace(memory, offset_m=offset, heading_rad=heading, since_m=since)
     if reading is None or reading.offset_variance_m2 > SURE_M2 or not math.isfinite(reading.heading_rad):
         return moved

@@ -46,7 +46,7 @@ FITS_SHARE = 0.1  # of a path that may seem to be no road: its cells are as coar
 SHIFT_STEP_M = 0.5
 
 NEAR_M = 0.5  # ahead of the rear axle, where the distance to the paint is measured
-AROUND = 80  # cells on each side of the vehicle in which the way is looked for: 16 m
+AROUND_M = 16.0  # on each side of the vehicle the way is looked for
 BEGINS_M, BORDER_M = 1.0, (1.5, 2.3)  # who has not driven farther has the border of a lane of 3.2 m that far aside
 STANDING_BENDS_1PM = tuple(0.08 * k for k in range(-4, 5))  # what a car that stands can turn its wheels to
 STANDS_ON_M = (-1.5, 3.9, 1.3)  # what the car stands on at the start is road: from behind to ahead, and to either side
@@ -176,12 +176,9 @@ class Ground:
         """
         if not self._has_border:
             self._begin_border(side)
-        middle = ((self.pose[:2] - self._origin_m) / CELL_M).astype(np.int64)
-        low = np.clip(middle - AROUND, 0, CELLS - 2 * AROUND)
-        part = np.ascontiguousarray(self._cells[low[0] : low[0] + 2 * AROUND, low[1] : low[1] + 2 * AROUND])
+        part, corner_m = self.around(AROUND_M)
         seen = seen_ground(part)
         field = CELL_M * cv2.distanceTransform(1 - borders(part), cv2.DIST_L2, 5).astype(np.float64)
-        corner_m = self._origin_m + CELL_M * low
         line = along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
         bends = sorted(STANDING_BENDS_1PM, key=lambda one: abs(one - bend_1pm)) if stands else [bend_1pm]
         tried = [
@@ -194,6 +191,14 @@ class Ground:
         fine = rows if len(rows) else np.array([[bend_1pm, self.pose[2], 0.0, 0.0]])
         fine = np.repeat(fine, int(sweep.STEP_M / STEP_M), axis=0)
         return Way(fine[:, 0], fine[:, 1], line[:, 3], free_m, seen_m)
+
+    def around(self, reach_m: float) -> tuple[UInt8Array, FloatArray]:
+        """The cells within so many metres of the vehicle to each side, and the corner (2,) where they begin."""
+        half = int(reach_m / CELL_M)
+        middle = ((self.pose[:2] - self._origin_m) / CELL_M).astype(np.int64)
+        low = np.clip(middle - half, 0, CELLS - 2 * half)
+        part = np.ascontiguousarray(self._cells[low[0] : low[0] + 2 * half, low[1] : low[1] + 2 * half])
+        return part, self._origin_m + CELL_M * low
 
     def border_m(self, side: float) -> float:
         """Distance from the vehicle's line of travel to the border on one side, just ahead of the rear axle; nan if unknown."""

@@ -20,19 +20,20 @@ Observed: TypeAlias = dict[str, Any]
 Action: TypeAlias = NDArray[Any]
 
 
-def observed(observation: Observation, radar: Radar | None, frame: Frame) -> Observed:
+def observed(observation: Observation, radar: Radar | None, frame: Frame, behind: bool = False) -> Observed:
     """What is sensed, as a dictionary.
 
     Args:
         observation: of the step.
         radar: what the radar says; None: it is left out.
         frame: (H, W, 3) of the camera, the last one where this step has none.
+        behind: whether the radar also says what is needed to reverse.
     """
     return {
         "frame": frame,
         "speed": _boxed(observation.speed, FASTEST_UNITS),
         "yaw_rate": _boxed(observation.yaw_rate_radps, FASTEST_TURN_RADPS),
-        **({} if radar is None else _radar(radar)),
+        **({} if radar is None else _radar(radar, behind)),
     }
 
 
@@ -66,9 +67,10 @@ def _boxed(value: float, most: float) -> Action:
     return np.clip(np.array([value], dtype=np.float32), -most, most)
 
 
-def _radar(radar: Radar) -> Observed:
+def _radar(radar: Radar, behind: bool) -> Observed:
+    gaps = {"gap_m": radar.gap_m, **({"gap_behind_m": radar.gap_behind_m, "moving_m": radar.moving_m} if behind else {})}
     return {
-        "gap_m": np.clip(np.array([radar.gap_m], dtype=np.float32), 0.0, RADAR_REACH_M),
+        **{name: np.clip(np.array([gap], dtype=np.float32), 0.0, RADAR_REACH_M) for name, gap in gaps.items()},
         "closing_mps": _boxed(radar.closing_mps, FASTEST_UNITS),
         "way_is_free": int(radar.way_is_free),
         "lamp": int(radar.lamp),

@@ -34,6 +34,9 @@ class Radar:
         way_is_free: nobody who has the right of way is coming to the junction ahead, for the movement that is indicated.
         lamp: the signal ahead.
         blind: the sensor delivers nothing; the other fields then mean nothing.
+        gap_behind_m: from the rear bumper to the nearest road user in the vehicle's path backwards; ``inf`` if there is none in
+            reach.
+        moving_m: from the body to the nearest road user that moves, in any direction; ``inf`` if there is none in reach.
     """
 
     gap_m: float = math.inf
@@ -41,6 +44,8 @@ class Radar:
     way_is_free: bool = True
     lamp: Lamp = Lamp.NONE
     blind: bool = False
+    gap_behind_m: float = math.inf
+    moving_m: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +72,12 @@ class Command:
     """What the vehicle is to do over the next step, and why.
 
     Args:
-        acceleration_mps2: along the vehicle; negative brakes.
+        acceleration_mps2: in the direction of the gear; negative brakes.
         steering_rad: of the road wheels, left positive.
         indicator: the turn indicator.
         state: what the navigator is doing.
         reason: one short sentence for people; empty where nothing is special.
+        reverse: the reverse gear. A vehicle that still rolls forwards brakes first, with the acceleration's magnitude.
     """
 
     acceleration_mps2: float
@@ -79,3 +85,4 @@ class Command:
     indicator: Indicator = Indicator.STRAIGHT
     state: DrivingState = DrivingState.SEARCHING
     reason: str = ""
+    reverse: bool = False

@@ -51,7 +51,7 @@ def watched(
     dt_s, yaw = observation.dt_s, observation.yaw_rate_radps
     dark = observation.frame is not None and is_dark(observation.frame, config.dark_level)
     expected = speed_mps * math.tan(steering_rad) / vehicle.wheelbase_m
-    moving = speed_mps > MOVING_MPS
+    moving = abs(speed_mps) > MOVING_MPS
     frozen = moving and yaw == health.last_yaw_radps and (yaw != 0.0 or abs(expected) > TURNING_RADPS)
     off = moving and abs(yaw - expected) > config.gyro_off_radps
     dark_s = health.dark_s + dt_s if dark or (observation.frame is None and health.dark_s > 0.0) else 0.0

@@ -79,11 +79,11 @@ def fly(world: World, mission: Mission, cockpit: Cockpit, look: Look | None = No
                     look(sensed, driver, command)
                 rows.append(_written(sensed, driver, command.state))
                 events += sensed.events
-                standing_s = standing_s + STEP_S if sensed.truth.speed_mps < STANDING_MPS else 0.0
-                arrived = command.state is DrivingState.ARRIVED and sensed.truth.speed_mps < STANDING_MPS
+                standing_s = standing_s + STEP_S if abs(sensed.truth.speed_mps) < STANDING_MPS else 0.0
+                arrived = command.state is DrivingState.ARRIVED and abs(sensed.truth.speed_mps) < STANDING_MPS
                 cause = _end(mission, sensed, command, standing_s)
                 if not cause:
-                    sensed = world.step(command.acceleration_mps2, command.steering_rad, command.indicator)
+                    sensed = world.step(command.acceleration_mps2, command.steering_rad, command.indicator, command.reverse)
     except MethodError as error:
         failure = cause = f"the policy failed: {error}"
         rows = rows or [_written(sensed, driver, DrivingState.HALTED)]
@@ -95,7 +95,7 @@ def fly(world: World, mission: Mission, cockpit: Cockpit, look: Look | None = No
 
 def _end(mission: Mission, sensed: Sensed, command: Command, standing_s: float) -> str:
     """Why the mission ends here; empty where it goes on."""
-    if command.state is DrivingState.ARRIVED and sensed.truth.speed_mps < STANDING_MPS:
+    if command.state is DrivingState.ARRIVED and abs(sensed.truth.speed_mps) < STANDING_MPS:
         return "arrived"
     if sensed.truth.t_s > limit_s(mission):
         return f"time is up: {command.state.name.lower()}, {command.reason}"

@@ -97,12 +97,12 @@ class KnownPose(PoseSource):
         units, turned = observation.speed * observation.dt_s, observation.yaw_rate_radps * observation.dt_s
         if self._follow:
             now = np.array(self.truth.pose_m)
-            self._units, self._metres = self._units + units, self._metres + float(np.hypot(*(now - self._pose)[:2]))
+            self._units, self._metres = self._units + abs(units), self._metres + float(np.hypot(*(now - self._pose)[:2]))
             self._pose = now
         else:
             distance, chord = units * self._scale, self._pose[2] + 0.5 * turned
             self._pose = self._pose + np.array([distance * math.cos(chord), distance * math.sin(chord), turned])
-            self._driven_m += distance
+            self._driven_m += abs(distance)
         sigma = TRUE_SIGMA_M if self._follow else min(0.3 + DRIFT_SHARE * self._driven_m, 1.0)
         covariance = np.diag([sigma**2, sigma**2, 0.01**2])
         return _estimate(observation.t_s, self._pose.copy(), covariance)

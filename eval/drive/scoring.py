@@ -43,7 +43,7 @@ DEFINITIONS: Final = {
     "false_arrivals": "times that an arrival was said elsewhere than at the goal",
     "red_lights": "red lights run",
     "rights_of_way": "rights of way taken",
-    "outside_lane_share": "share of the time with a wheel outside of the lane, or off the paving in junctions",
+    "outside_lane_share": "share of the time with a wheel outside of the lane; in junctions and turning round, off the paving",
     "lane_rms_m": "distance of the rear axle from the lane's middle outside of junctions, root mean square",
     "lane_worst_m": "the same, largest",
     "time_ratio": "time of successful missions over that of SUMO's own driver on them, mean",
@@ -70,7 +70,7 @@ def mission_result(mission: Mission, flight: Flight, network: RoadNetwork, refer
     there = apart_m <= REACHED_M and flight.end_lane == mission.goal_lane
     success = flight.arrived and there
     driven_m, time_s = float(flight.column("driven_m")[-1]), float(flight.column("t_s")[-1])
-    moving, road = flight.column("speed_mps") > MOVING_MPS, flight.column("in_junction") == 0.0
+    moving, road = np.abs(flight.column("speed_mps")) > MOVING_MPS, flight.column("in_junction") == 0.0
     aside = np.abs(flight.column("offset_m")[moving & road])
     aside = aside[np.isfinite(aside)]
     fixed = np.flatnonzero(flight.column("localized") > 0.0)

@@ -70,7 +70,7 @@ class Lookout:
         letter = self._letter(lane)
         coming = self._coming(lane, users, ego_m)
         way_m = sum(self._lengths_m[one] for one in way.inside)
-        entry = Entry(lane, line_m, way_m, way.turn_rad, speed_mps, letter)
+        entry = Entry(lane, line_m, way_m, way.turn_rad, max(speed_mps, 0.0), letter)
         return Ahead(signals, coming, not in_the_way(entry, coming, self._rights), LAMPS.get(letter, Lamp.NONE))
 
     def lamps_near(self, x_m: float, y_m: float, reach_m: float) -> dict[tuple[float, float, float], str]:

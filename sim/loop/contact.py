@@ -63,7 +63,7 @@ class Circumstances:
 
     Args:
         pose_m: the ego's rear axle.
-        speed_mps: the ego's.
+        speed_mps: the ego's, negative backwards.
         other_m: x, y, heading of the middle of the other.
         other_mps: the other's speed.
         in_own_lane: every wheel of the ego is in its lane, also through a junction.
@@ -87,12 +87,15 @@ class Circumstances:
 def is_at_fault(c: Circumstances) -> tuple[bool, str]:
     """Whether a collision is the ego's fault, and why or why not.
 
-    It is, but for three cases. *From behind*: the other heads the same way within 60 degrees, its middle is behind the ego's, it
-    is the faster one, and the ego was not changing lanes. *Had to yield*: the rights of way of the junction that both are in say
-    that the other waits, and the ego ran no red signal. *Left its lane*: the ego is within its own lane, to 30 cm, and the other
-    moves and is on a lane that neither crosses nor meets the ego's and that the ego does not follow, as long vehicles are that
-    swing out in turns; or it stands more than 20 degrees askew in the ego's lane outside of junctions, as who cuts in.
+    It is where it backs, and but for three cases where it does not. *From behind*: the other heads the same way within 60
+    degrees, its middle is behind the ego's, it is the faster one, and the ego was not changing lanes. *Had to yield*: the
+    rights of way of the junction that both are in say that the other waits, and the ego ran no red signal. *Left its lane*:
+    the ego is within its own lane, to 30 cm, and the other moves and is on a lane that neither crosses nor meets the ego's
+    and that the ego does not follow, as long vehicles are that swing out in turns; or it stands more than 20 degrees askew
+    in the ego's lane outside of junctions, as who cuts in.
     """
+    if c.speed_mps < -STANDS_MPS:
+        return True, "backed into another vehicle"
     cos, sin = math.cos(c.pose_m[2]), math.sin(c.pose_m[2])
     dx, dy = c.other_m[0] - c.pose_m[0], c.other_m[1] - c.pose_m[1]
     ahead_m = cos * dx + sin * dy - CENTRE_AHEAD_M

@@ -46,6 +46,8 @@ class EnvOptions:
         duration_s: after which a drive is truncated.
         radar: whether the radar is observed too.
         indicators: whether the action has a third number: below -1/3 the right indicator, above 1/3 the left one.
+        reverse: whether the action has one number more, its last: below 0 the reverse gear; with ``radar`` also ``gap_behind_m``
+            and ``moving_m`` are observed.
         acceleration_range_mps2, steering_range_rad: what the actions -1 and 1 mean.
     """
 
@@ -53,6 +55,7 @@ class EnvOptions:
     duration_s: float = 300.0
     radar: bool = False
     indicators: bool = False
+    reverse: bool = False
     acceleration_range_mps2: tuple[float, float] = ACCELERATION_RANGE_MPS2
     steering_range_rad: tuple[float, float] = STEERING_RANGE_RAD
 
@@ -91,13 +94,15 @@ class TownEnv(gymnasium.Env[Observed, Action]):
         self._sensed: Sensed | None = None
         camera = scenario.camera
         self._frame: Frame = np.zeros((camera.height, camera.width, 3), dtype=np.uint8)
-        self.action_space = spaces.Box(-1.0, 1.0, (3 if self.options.indicators else 2,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (2 + self.options.indicators + self.options.reverse,), np.float32)
         radar = {
             "gap_m": spaces.Box(0.0, RADAR_REACH_M, (1,), np.float32),
             "closing_mps": spaces.Box(-FASTEST_UNITS, FASTEST_UNITS, (1,), np.float32),
             "way_is_free": spaces.Discrete(2),
             "lamp": spaces.Discrete(len(Lamp)),
         }
+        if self.options.reverse:
+            radar |= {name: spaces.Box(0.0, RADAR_REACH_M, (1,), np.float32) for name in ("gap_behind_m", "moving_m")}
         self.observation_space = spaces.Dict(
             {
                 "frame": spaces.Box(0, 255, self._frame.shape, np.uint8),
@@ -127,13 +132,13 @@ class TownEnv(gymnasium.Env[Observed, Action]):
         accel = mapped(float(numbers[0]), self.options.acceleration_range_mps2)
         steering = mapped(float(numbers[1]), self.options.steering_range_rad)
         indicator = indicator_of(float(numbers[2])) if self.options.indicators else Indicator.STRAIGHT
-        return self.drive(accel, steering, indicator)
+        return self.drive(accel, steering, indicator, self.options.reverse and float(numbers[-1]) < 0.0)
 
     def drive(
-        self, acceleration_mps2: float, steering_rad: float, indicator: Indicator
+        self, acceleration_mps2: float, steering_rad: float, indicator: Indicator, reverse: bool = False
     ) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """``step`` in SI units."""
-        sensed = self.world.step(acceleration_mps2, steering_rad, indicator)
+        sensed = self.world.step(acceleration_mps2, steering_rad, indicator, reverse)
         self._sensed = sensed
         gain, fines = self._reward.of(sensed)
         crashed = any(event.kind in (EventKind.COLLISION, EventKind.BUILDING) for event in sensed.events)
@@ -159,7 +164,7 @@ class TownEnv(gymnasium.Env[Observed, Action]):
         if observation.frame is not None:
             self._frame = observation.frame
         frame = self._frame if observation.frame is not None else self._frame.copy()
-        return observed(observation, sensed.radar if self.options.radar else None, frame)
+        return observed(observation, sensed.radar if self.options.radar else None, frame, self.options.reverse)
 
     def _info(self, sensed: Sensed, fines: dict[str, float]) -> dict[str, Any]:
         return {"truth": asdict(sensed.truth), "events": [asdict(event) for event in sensed.events], "fines": fines}
@@ -170,4 +175,4 @@ class TownEnv(gymnasium.Env[Observed, Action]):
         truth, goal = sensed.truth, self._goal
         near = math.hypot(truth.x_m - goal.x_m, truth.y_m - goal.y_m) <= ARRIVED_M
         turn = abs((truth.heading_rad - goal.heading_rad + math.pi) % (2.0 * math.pi) - math.pi)
-        return near and turn <= ARRIVED_RAD and truth.speed_mps <= ARRIVED_MPS
+        return near and turn <= ARRIVED_RAD and abs(truth.speed_mps) <= ARRIVED_MPS

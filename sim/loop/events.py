@@ -16,6 +16,7 @@ TOLERANCE_M: Final = 0.05  # a tyre on the line is in the lane
 OVER_S: Final = 1.0  # what has not been seen for so long is over, and would be a new event
 WRONG_WAY_S: Final = 0.5  # against the traffic for so long, and moving
 MOVING_MPS: Final = 0.3
+LONG_M: Final = 20.0  # who backs farther in one manoeuvre drives against the traffic
 SWING_M: Final = 0.3  # in turns the wheels need not be in the lane's middle
 STEADY_S: Final = 2.0  # so long the ego must have been in its lane to be there by right
 
@@ -24,15 +25,17 @@ class Watch:
     """Detects events. It remembers what is under way, so that each is logged once, at its beginning.
 
     *Collision*: the box of the ego and that of another vehicle overlap by more than 5 cm; at fault as ``is_at_fault`` says.
-    *Building*: the ego's body touches one. *Kerb*: a wheel stands more than 5 cm off everything that is paved for cars: lanes,
-    junctions, turning places. *Left lane*: outside of junctions a wheel stands more than 5 cm outside of the ego's lane and
-    those beside it in the same direction. *Left road*: the middle of the ego and a wheel are off everything that is paved.
-    *Wrong way*: outside of junctions the middle of the moving ego has been for half a second on a lane that runs against it and
-    on none that runs with it. *Red light*: the front bumper passes the end of a lane whose signal for the way taken is red,
-    before and after the step; yellow is none. *Right of way*: the front bumper enters a junction and a vehicle that the ego had
-    to let pass, on a way that crosses or meets the ego's, would be there within 2 s at its present speed or is in the first
-    half of its way through; or such a vehicle brakes with more than 4 m/s^2 while the ego is in the junction. *Put back*: SUMO
-    had taken the ego off the road. What has not been seen for a second is over; if it comes again, it is a new event.
+    *Building*: the ego's body touches one. *Kerb*: a wheel stands more than 5 cm off everything that is paved for cars:
+    lanes, junctions, turning places. *Left lane*: outside of junctions a wheel stands more than 5 cm outside of the ego's
+    lane and those beside it in the same direction. *Left road*: the middle of the ego and a wheel are off all that is paved.
+    *Wrong way*: outside of junctions the middle of the moving ego has been for half a second on a lane that runs against it
+    and on none that runs with it, but while it turns round, that is from the reverse gear on until 10 m have been driven
+    forwards; or the ego has backed for more than 20 m in one such manoeuvre. *Red light*: the front bumper passes the end
+    of a lane whose signal for the way taken is red, before and after the step; yellow is none. *Right of way*: the front
+    bumper enters a junction and a vehicle that the ego had to let pass, on a way that crosses or meets the ego's, would be
+    there within 2 s at its present speed or is in the first half of its way through; or such a vehicle brakes with more
+    than 4 m/s^2 while the ego is in the junction. *Put back*: SUMO had taken the ego off the road. What has not been seen
+    for a second is over; if it comes again, it is a new event.
     """
 
     def __init__(self, rights: Rights) -> None:
@@ -56,10 +59,12 @@ class Watch:
     def _conditions(self, m: Moment) -> Iterator[Event]:
         truth = m.truth
         on_road = truth.lane >= 0 and not truth.in_junction
-        wrong = m.against and on_road and truth.speed_mps > MOVING_MPS
+        against = m.against and truth.speed_mps > MOVING_MPS and not m.turns_round
+        backs = m.backed_m > LONG_M and truth.speed_mps < -MOVING_MPS
+        wrong = on_road and (against or backs)
         self._against_since_s = min(self._against_since_s, truth.t_s) if wrong else math.inf
         outside = on_road and truth.wheel_outside_m > TOLERANCE_M
-        if outside or not on_road:
+        if outside or not on_road or m.turns_round:
             self._steady_since_s = truth.t_s
         for kind, holds, text in (
             (EventKind.KERB, truth.off_paving_m > TOLERANCE_M, "a wheel off the paving"),
@@ -86,7 +91,7 @@ class Watch:
         x, y, heading = m.users.poses_m[row, :3].tolist()
         own = [lane for lane in (truth.lane, m.front_lane) if lane in self._rights.junction_of]
         first = any(self._rights.must_yield(other, lane) and not self._rights.must_yield(lane, other) for lane in own)
-        keeps = not own and (truth.t_s - self._steady_since_s >= STEADY_S or truth.speed_mps < MOVING_MPS)
+        keeps = not own and (truth.t_s - self._steady_since_s >= STEADY_S or abs(truth.speed_mps) < MOVING_MPS)
         return Circumstances(
             pose_m=truth.pose_m,
             speed_mps=truth.speed_mps,

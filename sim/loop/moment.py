@@ -27,6 +27,8 @@ class Moment:
         coming: vehicles on their way into the junction ahead.
         building: the ego's body touches a building.
         put_back: SUMO had lost the ego.
+        turns_round: the ego backs or turns round, as ``turnround.Manoeuvre`` says.
+        backed_m: how far it has driven backwards in that manoeuvre.
     """
 
     truth: Truth
@@ -41,6 +43,8 @@ class Moment:
     coming: Sequence[Comer]
     building: bool
     put_back: bool
+    turns_round: bool = False
+    backed_m: float = 0.0
 
 
 def event(kind: EventKind, truth: Truth, text: str, other: str = "", at_fault: bool = True) -> Event:

@@ -21,11 +21,14 @@ class Odometry:
         self._jump, self._to_next_jump_m = 0.0, float(rng.exponential(noise.scale_jump_every_m))
 
     def sense(self, travelled_m: float, turned_rad: float, dt_s: float) -> tuple[float, float]:
-        """Mean speed [map units per second] and mean yaw rate [rad/s] over the last ``dt_s``."""
+        """Mean speed [map units per second] and mean yaw rate [rad/s] over the last ``dt_s``.
+
+        A way driven backwards is negative, and so is its speed: wheel sensors know the direction from the gear.
+        """
         noise, rng = self._noise, self._rng
-        keep = math.exp(-travelled_m / noise.scale_wander_length_m)
+        keep = math.exp(-abs(travelled_m) / noise.scale_wander_length_m)
         self._wander = keep * self._wander + noise.scale_wander * math.sqrt(1.0 - keep**2) * rng.standard_normal()
-        self._to_next_jump_m -= travelled_m
+        self._to_next_jump_m -= abs(travelled_m)
         while self._to_next_jump_m <= 0.0:
             self._jump = noise.scale_jump * rng.standard_normal()
             self._to_next_jump_m += float(rng.exponential(noise.scale_jump_every_m))

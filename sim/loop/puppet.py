@@ -14,6 +14,7 @@ from hippodrome.sim.sumo_run import EGO
 
 KEEP_ROUTE: Final = 2  # SUMO's word for: wherever it is, also off its route and off the road
 SIGNALS: Final = {Indicator.RIGHT: 1, Indicator.STRAIGHT: 0, Indicator.LEFT: 2}  # SUMO's bits of the blinkers
+BACKS: Final = 128  # SUMO's bit of the reversing lamps
 
 
 class Puppet:
@@ -28,16 +29,23 @@ class Puppet:
         self.misplaced = 0  # steps after which SUMO had the ego on another lane than told: others may not have seen it
 
     def place(
-        self, front_m: tuple[float, float, float], speed_mps: float, lane: int, before: int, indicator: Indicator
+        self,
+        front_m: tuple[float, float, float],
+        speed_mps: float,
+        lane: int,
+        before: int,
+        indicator: Indicator,
+        reverse: bool = False,
     ) -> Way | None:
         """Puts the ego where it is.
 
         Args:
             front_m: of the front bumper.
-            speed_mps: what others believe.
+            speed_mps: what others believe; one that backs stands for them, as SUMO's vehicles never do.
             lane: that the front bumper is on, -1 off the road.
             before: the last lane outside of junctions that it was on.
             indicator: what it means to do ahead.
+            reverse: whether the reversing lamps are lit.
 
         Returns:
             The way through the junction ahead that lane and indicator mean; None off the road, and where none leads on.
@@ -51,8 +59,8 @@ class Puppet:
         edge, _, number = self._network.lane_ids[lane].rpartition("_") if lane >= 0 else ("", "", "-1")
         angle = 90.0 - math.degrees(heading)
         libsumo.vehicle.moveToXY(EGO, edge, int(number), x, y, angle, KEEP_ROUTE)
-        libsumo.vehicle.setSpeed(EGO, speed_mps)
-        libsumo.vehicle.setSignals(EGO, SIGNALS[indicator])
+        libsumo.vehicle.setSpeed(EGO, max(speed_mps, 0.0))
+        libsumo.vehicle.setSignals(EGO, SIGNALS[indicator] + (BACKS if reverse else 0))
         return way
 
     def check(self, lane: int) -> None:

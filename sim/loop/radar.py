@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from hippodrome.core.navigation.types import Lamp, Radar
 from hippodrome.core.types import FloatArray
-from hippodrome.sim.ego_spec import REAR_AXLE_TO_FRONT_M
+from hippodrome.sim.ego_spec import LENGTH_M, REAR_AXLE_TO_FRONT_M
 from hippodrome.sim.loop.car import CENTRE_AHEAD_M, WIDTH_M
 from hippodrome.sim.loop.contact import corners_m
 from hippodrome.sim.loop.users import Users
@@ -19,17 +20,27 @@ BESIDE_M: Final = 0.3  # so much room is kept on each side of the ego's own swep
 MOST_TURN_RAD: Final = 0.5 * math.pi  # the swept path ends where it has turned by a right angle
 GAP_NOISE_M: Final = 0.1  # standard deviations of a measurement
 SPEED_NOISE_MPS: Final = 0.1
+BEHIND_REACH_M: Final = 20.0  # of what warns of those behind
+AROUND_REACH_M: Final = 50.0  # and of those who come from any side, as rear cross traffic alert does
+MOVES_MPS: Final = 0.3
 
 
-def nearest_ahead(pose_m: tuple[float, float, float], curvature_1pm: float, users: Users) -> tuple[float, float]:
+def nearest_ahead(
+    pose_m: tuple[float, float, float],
+    curvature_1pm: float,
+    users: Users,
+    middle_m: float = CENTRE_AHEAD_M,
+    bumper_m: float = REAR_AXLE_TO_FRONT_M,
+) -> tuple[float, float]:
     """Gap [m] from the front bumper along the swept path to the nearest road user, and that one's speed along it.
 
     The swept path is the band that the body covers if the steering stays as it is: an arc of the rear axle's curvature. Users
-    are taken by points round their outlines. Without one in reach the gap is ``inf``.
+    are taken by points round their outlines. Without one in reach the gap is ``inf``. The body's middle and its bumper lie so far
+    ahead of the rear axle.
     """
     if len(users.names) == 0:
         return math.inf, 0.0
-    points = _outline_m(corners_m(users.poses_m, users.sizes_m))
+    points = outline_m(corners_m(users.poses_m, users.sizes_m))
     dx, dy = points[..., 0] - pose_m[0], points[..., 1] - pose_m[1]
     cos, sin = math.cos(pose_m[2]), math.sin(pose_m[2])
     forward, left = cos * dx + sin * dy, cos * dy - sin * dx
@@ -40,7 +51,7 @@ def nearest_ahead(pose_m: tuple[float, float, float], curvature_1pm: float, user
         along = np.arctan2(forward, (radius - left) * np.sign(radius)) * abs(radius)
         aside = radius - np.sign(radius) * np.hypot(forward, radius - left)
     far = min(REACH_M, MOST_TURN_RAD / max(abs(curvature_1pm), 1e-6))  # who steers to and fro does not drive in a circle
-    inside = (np.abs(aside) <= 0.5 * WIDTH_M + BESIDE_M) & (along > CENTRE_AHEAD_M) & (along < far + REAR_AXLE_TO_FRONT_M)
+    inside = (np.abs(aside) <= 0.5 * WIDTH_M + BESIDE_M) & (along > middle_m) & (along < far + bumper_m)
     if not inside.any():
         return math.inf, 0.0
     along = np.where(inside, along, np.inf)
@@ -48,10 +59,29 @@ def nearest_ahead(pose_m: tuple[float, float, float], curvature_1pm: float, user
     place = float(along[user].min())
     direction = pose_m[2] + curvature_1pm * place
     speed = float(users.speed_mps[user]) * math.cos(float(users.poses_m[user, 2]) - direction)
-    return max(place - REAR_AXLE_TO_FRONT_M, 0.0), speed
+    return max(place - bumper_m, 0.0), speed
 
 
-def _outline_m(corners_m: FloatArray) -> FloatArray:
+def nearest_behind_m(pose_m: tuple[float, float, float], curvature_1pm: float, users: Users) -> float:
+    """Gap [m] from the rear bumper along what the body sweeps backwards to the nearest road user; ``inf`` without one."""
+    turned = pose_m[0], pose_m[1], pose_m[2] + math.pi  # seen from behind, left is right
+    gap_m, _ = nearest_ahead(turned, -curvature_1pm, users, -CENTRE_AHEAD_M, LENGTH_M - REAR_AXLE_TO_FRONT_M)
+    return gap_m
+
+
+def nearest_moving_m(pose_m: tuple[float, float, float], users: Users) -> float:
+    """Distance [m] from the ego's body to the nearest road user that moves; ``inf`` without one."""
+    moving = users.speed_mps > MOVES_MPS if len(users.names) else np.zeros(0, dtype=np.bool_)
+    if not moving.any():
+        return math.inf
+    apart = outline_m(corners_m(users.poses_m, users.sizes_m)[moving]) - np.array(pose_m[:2])
+    cos, sin = math.cos(pose_m[2]), math.sin(pose_m[2])
+    ahead = np.abs(cos * apart[..., 0] + sin * apart[..., 1] - CENTRE_AHEAD_M) - 0.5 * LENGTH_M
+    aside = np.abs(cos * apart[..., 1] - sin * apart[..., 0]) - 0.5 * WIDTH_M
+    return float(np.hypot(np.maximum(ahead, 0.0), np.maximum(aside, 0.0)).min())
+
+
+def outline_m(corners_m: FloatArray) -> FloatArray:
     """Points (k, 20, 2) round boxes (k, 4, 2)."""
     following = np.roll(corners_m, -1, axis=1)
     share = np.linspace(0.0, 1.0, 5, endpoint=False)[:, None]
@@ -66,3 +96,14 @@ def measured(gap_m: float, speed_mps: float, own_mps: float, way_is_free: bool, 
         return Radar(way_is_free=way_is_free, lamp=lamp)
     gap = max(gap_m + GAP_NOISE_M * float(gap_noise), 0.0)
     return Radar(gap, own_mps - speed_mps + SPEED_NOISE_MPS * float(speed_noise), way_is_free, lamp)
+
+
+def with_surroundings(
+    radar: Radar, pose_m: tuple[float, float, float], curvature_1pm: float, users: Users, rng: np.random.Generator
+) -> Radar:
+    """The same with what the sensors behind and around say, whose noise is drawn apart, so that it changes no other number."""
+    behind_noise, around_noise = rng.standard_normal(2)
+    behind_m, moving_m = nearest_behind_m(pose_m, curvature_1pm, users), nearest_moving_m(pose_m, users)
+    behind = max(behind_m + GAP_NOISE_M * float(behind_noise), 0.0) if behind_m < BEHIND_REACH_M else math.inf
+    around = max(moving_m + GAP_NOISE_M * float(around_noise), 0.0) if moving_m < AROUND_REACH_M else math.inf
+    return replace(radar, gap_behind_m=behind, moving_m=around)

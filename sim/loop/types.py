@@ -29,7 +29,7 @@ class Truth:
     Args:
         t_s: time since the reset, seconds.
         x_m, y_m, heading_rad: the rear axle's pose in the network frame.
-        speed_mps: of the rear axle, along the slope.
+        speed_mps: of the rear axle, along the slope, negative backwards.
         yaw_rate_radps: counter-clockwise positive.
         acceleration_mps2: what was carried out over the last step, after the vehicle's limits.
         steering_rad: where the road wheels are, left positive.
@@ -40,7 +40,7 @@ class Truth:
         offset_m: of the rear axle from the lane's middle, left positive; nan off the road.
         lane_heading_error_rad: heading of the vehicle against the lane's; nan off the road.
         wheel_outside_m: how far the worst wheel is outside of the lane and those beside it in the same direction or, in a
-            junction, off the paving; 0 inside.
+            junction and while it turns round, off the paving; 0 inside.
         off_paving_m: how far the worst wheel is off everything paved for cars: lanes, junctions, turning places; 0 on it.
         in_junction: whether the rear axle is on a lane inside a junction.
         driven_m: way of the rear axle since the reset, seen from above.

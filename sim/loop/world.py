@@ -17,7 +17,7 @@ from hippodrome.core.types import Frame, HippodromeError, Observation
 from hippodrome.sim.ego_spec import LENGTH_M
 from hippodrome.sim.loop.ahead import Lookout
 from hippodrome.sim.loop.barriers import bar, closed_edges
-from hippodrome.sim.loop.car import Car
+from hippodrome.sim.loop.car import Car, travelled_m
 from hippodrome.sim.loop.events import Watch
 from hippodrome.sim.loop.footing import height_and_pitch, stand
 from hippodrome.sim.loop.ground import Ground
@@ -25,12 +25,13 @@ from hippodrome.sim.loop.lamps import signal_heads
 from hippodrome.sim.loop.moment import Moment
 from hippodrome.sim.loop.odometry import Odometry
 from hippodrome.sim.loop.puppet import Puppet
-from hippodrome.sim.loop.radar import measured, nearest_ahead
+from hippodrome.sim.loop.radar import measured, nearest_ahead, with_surroundings
 from hippodrome.sim.loop.recorder import Recorder
 from hippodrome.sim.loop.rights import Rights
 from hippodrome.sim.loop.sight import Sight
 from hippodrome.sim.loop.start import clear_room, drawn_start, lane_and_position
 from hippodrome.sim.loop.top_view import TopView
+from hippodrome.sim.loop.turnround import Courtesy, Manoeuvre
 from hippodrome.sim.loop.types import EventKind, LanePlace, Sensed, Truth
 from hippodrome.sim.loop.users import Onlooker
 from hippodrome.sim.loop.walls import Walls
@@ -119,7 +120,8 @@ class World:
         if World._live is not None:
             World._live.close() if World._live is not self else self._end()
         World._live = self
-        rng_traffic, rng_start, self._rng_odometry, self._rng_radar = (np.random.default_rng([seed, k]) for k in range(4))
+        rngs = [np.random.default_rng([seed, k]) for k in range(5)]
+        rng_traffic, rng_start, self._rng_odometry, self._rng_radar, self._rng_around = rngs
         self._seed, ego = seed, self._drive.ego
         edges = self._graph.edges[self._area]
         place = drawn_start(self.network, edges, rng_start) if start is None else lane_and_position(self.network, start)
@@ -142,35 +144,38 @@ class World:
         self._steps, self._driven_m = 0, 0.0
         self._lane, self._front_lane, self._before = lane, lane, lane
         self._indicator, self._accel_mps2 = Indicator.STRAIGHT, 0.0
+        self._manoeuvre, self._courtesy, self._reverse = Manoeuvre(), Courtesy(), False
         self._signals: dict[int, str] = {}
         self.cleared = clear_room(self._onlooker.near(*self._car.pose_m[:2]), self._car.pose_m)
         self._move()
         return self._sensed(0.0, 0.0)
 
-    def step(self, acceleration_mps2: float, steering_rad: float, indicator: Indicator = Indicator.STRAIGHT) -> Sensed:
+    def step(
+        self, acceleration_mps2: float, steering_rad: float, indicator: Indicator = Indicator.STRAIGHT, reverse: bool = False
+    ) -> Sensed:
         """Drives on for a tenth of a second.
 
         Args:
-            acceleration_mps2: along the vehicle, negative brakes; held to what the car can do.
+            acceleration_mps2: in the direction of the gear, negative brakes; held to what the car can do.
             steering_rad: of the road wheels, left positive; they turn no faster than a driver turns them.
             indicator: what the driver means to do at the junction ahead.
+            reverse: the reverse gear; a car that still rolls forwards brakes first.
 
-        Raises:
-            HippodromeError: a command is not a finite number, there was no reset, or SUMO fails.
+        Raises HippodromeError where a command is not a finite number, there was no reset, or SUMO fails.
         """
         if self._sumo is None:
-            raise HippodromeError(
-                "world: step() before reset(), or after close() or the reset of another world; call reset(seed)"
-            )
+            raise HippodromeError("world: step() before reset(), or after close() or another world's reset; call reset(seed)")
         if not (math.isfinite(acceleration_mps2) and math.isfinite(steering_rad)):
             raise HippodromeError(
                 f"world: command ({acceleration_mps2}, {steering_rad}) at {self._steps * STEP_S:.1f} s is not two finite numbers"
             )
-        (x, y, _), speed, heading = self._car.pose_m, self._car.speed_mps, self._car.heading_rad
-        self._car.drive(acceleration_mps2, steering_rad, STEP_S)
-        travelled = math.hypot(self._car.pose_m[0] - x, self._car.pose_m[1] - y)
-        self._driven_m += travelled
-        self._indicator, self._accel_mps2 = indicator, (self._car.speed_mps - speed) / STEP_S
+        before, speed, heading = self._car.pose_m, self._car.speed_mps, self._car.heading_rad
+        self._car.drive(acceleration_mps2, steering_rad, STEP_S, reverse)
+        travelled = travelled_m(before, self._car.pose_m)
+        self._driven_m += abs(travelled)
+        self._manoeuvre.go_on(travelled, self._car.speed_mps, reverse)
+        self._reverse, self._indicator = reverse, indicator
+        self._accel_mps2 = (self._car.speed_mps - speed) / STEP_S
         self._steps += 1
         if self._steps % REFILL_STEPS == 0:
             self._others.refill(ego_on_road=True)
@@ -193,12 +198,13 @@ class World:
         self._lift = height_and_pitch(self.ground, pose, self._footing)
         speed, put_back = self._car.speed_mps, self.put_back
         try:
-            self._puppet.place(self._footing.front_m, speed, self._front_lane, self._before, self._indicator)
+            self._puppet.place(self._footing.front_m, speed, self._front_lane, self._before, self._indicator, self._reverse)
             libsumo.simulationStep()
             self._puppet.check(self._front_lane)
             self._users = self._onlooker.near(*pose[:2])
             self._ahead = self._lookout.look(self._footing, self._before, self._indicator, speed, self._users, pose[:2])
             user_lanes = self._lookout.lanes_of(self._users)
+            self._courtesy.look(pose, self._users, self._manoeuvre.is_under_way)
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise HippodromeError(f"{self.town.net_file}: SUMO failed: {' '.join(str(error).split())}") from error
         self._truth = self._look_down()
@@ -216,6 +222,8 @@ class World:
             coming=self._ahead.coming,
             building=self._footing.off_paving_m > 0.0 and self._walls.touch(pose),
             put_back=self.put_back > put_back,
+            turns_round=self._manoeuvre.is_under_way,
+            backed_m=self._manoeuvre.backed_m,
         )
         self._events = self._watch.look(moment)
         if any(event.kind in (EventKind.COLLISION, EventKind.BUILDING) for event in self._events):
@@ -226,6 +234,7 @@ class World:
         speed, yaw_rate = self._odometry.sense(travelled_m / self._level(), turned_rad, STEP_S)
         gap, other = nearest_ahead(pose, self._car.curvature_1pm, self._users)
         radar = measured(gap, other, self._car.speed_mps, self._ahead.way_is_free, self._ahead.lamp, self._rng_radar)
+        radar = with_surroundings(radar, pose, self._car.curvature_1pm, self._users, self._rng_around)
         frame: Frame | None = None
         if self._draw and self._sight.is_due(self._steps):
             seen_from = np.array([*pose, *self._lift])
@@ -240,11 +249,7 @@ class World:
     def recording(self, folder: Path) -> Iterator[None]:
         """Writes the drive that begins with the next ``reset`` in the block as a recording, which is finished after the block.
 
-        Args:
-            folder: which must not exist, or be empty.
-
-        Raises:
-            HippodromeError: there is something in the folder, or no drive was made.
+        Raises HippodromeError where there is something in the ``folder`` already, or no drive was made.
         """
         self._recorder = Recorder(folder, self.scenario, self.network)
         try:
@@ -286,7 +291,7 @@ class World:
             lane_position_m=footing.position_m,
             offset_m=footing.offset_m,
             lane_heading_error_rad=footing.heading_error_rad,
-            wheel_outside_m=footing.wheel_outside_m,
+            wheel_outside_m=footing.off_paving_m if self._manoeuvre.is_under_way else footing.wheel_outside_m,
             off_paving_m=footing.off_paving_m,
             in_junction=footing.in_junction,
             driven_m=self._driven_m,

@@ -262,3 +262,32 @@ def test_the_sketched_search_localizes_like_the_exhaustive_one(default_run):
     assert np.mean([estimate.localized for estimate in estimates]) > np.mean([one.localized for one in exhaustive]) - 0.02
     assert np.median(apart_m) < 0.1
     assert np.max(apart_m) < 3.0
+
+
+@pytest.mark.parametrize("make", [KalmanBelief.uniform, AttractorBelief.uniform])
+def test_backwards_undoes_what_forwards_did(make):
+    belief = make(np.zeros(2), 0.0, LocalizerConfig())
+    belief = belief.inject(PoseMeasurement(np.array([0.0, 0.0, 0.3]), np.diag([0.01, 0.01, 1e-4])))
+    begin = belief.pose
+    there = [Motion(0.3, 0.02, 0.1)] * 40
+    for motion in [*there, *(Motion(-m.travelled, -m.turned_rad, m.dt_s) for m in there)]:
+        belief = belief.predict(motion)
+    assert_allclose(belief.pose, begin, atol=0.02)
+    assert np.linalg.eigvalsh(belief.covariance).min() > 0.0
+
+
+def test_a_localizer_that_backs_keeps_its_place():
+    observations, _ = drive(PICTURES, np.random.default_rng(11), 137.0, 300.0, metres_per_unit=2.5)
+    localizer = Localizer(MAP, None, LocalizerConfig())
+    for observation in observations:
+        before = localizer.step(observation)
+    assert before.localized
+    last = observations[-1]
+    for k in range(1, 21):
+        t_s = last.t_s + k * last.dt_s
+        estimate = localizer.step(Observation(t_s, last.dt_s, -last.speed, 0.0, last.frame if k % 5 == 0 else None))
+    back_m = 20 * last.dt_s * last.speed * localizer.metres_per_unit
+    apart = estimate.pose[:2] - before.pose[:2]
+    along = np.array([np.cos(before.pose[2]), np.sin(before.pose[2])])
+    assert apart @ along == pytest.approx(-back_m, rel=0.35)
+    assert np.isfinite(estimate.covariance).all()

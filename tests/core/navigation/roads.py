@@ -55,6 +55,15 @@ def ring(side=100.0, radius=8.0):
     return network_of([*sides, *corners], onward, internal=(4, 5, 6, 7))
 
 
+def street(length=80.0, width=3.2, onward=True):
+    """A two-way street along the x axis that ends in nothing: lane 0 leads there, lane 1 back, to lane 2 if ``onward``."""
+    half = 0.5 * width
+    lines = [[(0.0, -half), (length, -half)], [(length, half), (0.0, half)], [(0.0, half), (-60.0, half)]]
+    network = network_of(lines, [(1, 2)] if onward else [])
+    network.width_m[:] = width
+    return network
+
+
 def two_ways(detour=3):
     """From lane 0 to lane 4 by lane 1, which is short, or by lanes 2 and 3, which take 200 m more."""
     lines = [
@@ -86,7 +95,10 @@ class Bicycle:
         self.yaw = 0.0
 
     def drive(self, command, dt_s=0.1):
-        self.speed = max(0.0, self.speed + dt_s * min(max(command.acceleration_mps2, -8.0), 4.0))
+        gear, accel = -1.0 if command.reverse else 1.0, min(max(command.acceleration_mps2, -8.0), 4.0)
+        along = gear * self.speed
+        along = max(0.0, along + dt_s * accel) if along >= 0.0 else min(0.0, along + dt_s * abs(accel))
+        self.speed = gear * along
         self.wheels += min(max(command.steering_rad - self.wheels, -0.09), 0.09)
         turned = self.speed * dt_s * math.tan(self.wheels) / WHEELBASE_M
         chord = self.pose[2] + 0.5 * turned

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hippodrome.core.navigation.config import PlanConfig
-from hippodrome.core.navigation.routes import mapped_lanes, road_times, route, time_left_s, times_to_goal
-from tests.core.navigation.roads import map_along, network_of, ring, two_ways
+from hippodrome.core.navigation.routes import mapped_lanes, place_to_turn, road_times, route, time_left_s, times_to_goal
+from tests.core.navigation.roads import map_along, network_of, ring, street, two_ways
 
 CONFIG = PlanConfig(speed_share=1.0, unmapped_factor=2.0)
 
@@ -63,3 +63,23 @@ def test_a_lane_is_mapped_where_vertices_lie_all_along_it():
     known = map_along(network)
     known.poses = known.poses[(known.poses[:, 0] < 151.0) & (np.abs(known.poses[:, 1]) < 1.0)]
     assert mapped_lanes(network, known, 12.0).tolist() == [True, True, False, False, False]
+
+
+def test_turning_round_is_a_way_only_where_it_is_asked_for_and_costs_what_it_is_said_to():
+    network = street(80.0)
+    roads, times = planned(network, goal=(2, 10.0))
+    assert time_left_s(roads, times, 0, 30.0) == math.inf
+    opposite = (1, 0, -1)
+    turning = times_to_goal(roads, 2, 10.0, (), CONFIG, opposite)
+    assert turning.from_begin_s[0] == pytest.approx(CONFIG.turn_round_s + 1.0)  # at its beginning, and 10 m
+    assert turning.from_begin_s[1] == times.from_begin_s[1]
+    assert place_to_turn(roads, turning, 0, 30.0, opposite, CONFIG) == (0, 30.0)
+
+
+def test_where_only_a_later_street_has_two_ways_one_turns_there():
+    lines = [[(-60, -1.6), (0, -1.6)], [(0, -1.6), (80, -1.6)], [(80, 1.6), (0, 1.6)], [(0, 1.6), (0, 90)]]
+    network = network_of(lines, [(0, 1), (2, 3)])
+    roads, times = planned(network, goal=(3, 50.0))
+    assert time_left_s(roads, times, 0, 10.0) == math.inf
+    turning = times_to_goal(roads, 3, 50.0, (), CONFIG, (-1, 2, 1, -1))
+    assert place_to_turn(roads, turning, 0, 10.0, (-1, 2, 1, -1), CONFIG) == (1, 0.0)

@@ -20,6 +20,7 @@ from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.problem import search_problem
 from hippodrome.core.matching.search.route import Route, most_likely_drive
 from hippodrome.core.refinement.edges import edges_where
+from hippodrome.core.refinement.residuals import GYRO
 from hippodrome.core.refinement.solver import RouteSolution, SolverConfig, refine_along_route
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import (
@@ -45,6 +46,7 @@ class RouteRefineConfig:
     search: RouteSearchConfig = field(default_factory=RouteSearchConfig)
     confidence: ConfidenceConfig = field(default_factory=ConfidenceConfig)
     solver: SolverConfig = field(default_factory=SolverConfig)
+    road_reading: bool = True  # use what the mapper read of the road, if it did: place in the lane, and the lane's end
 
 
 def refine_route(
@@ -67,13 +69,14 @@ def refine_route(
     solver = config.solver
     if solver.survey_sigma_m is None:
         solver = replace(solver, survey_sigma_m=network.survey_sigma_m)
-    solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver)
+    read = network if config.road_reading else None
+    solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver, read)
     if np.any(free):
         drawn = np.column_stack([solution.state.drawn_points_m, solution.state.poses[:, 2]])
         chosen = choose_lanes(drawn, vouched > 0.0, network, config.search)
         line, arc = _line_and_places(chosen, network)
         log_scale, free = solution.state.log_scale, near_lane_changes(line, network)
-        solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver)
+        solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver, read)
     status = reject_displaced(status, route, solution.state.drawn_points_m, config.confidence)
     status = reject_uncertain(status, solution.covariance[:, :2, :2], config.confidence)
     return _refinement(cognitive_map, network, line, solution, status)
@@ -143,7 +146,7 @@ def _covariance(covariance: FloatArray, network: RoadNetwork, status: UInt8Array
 def _estimates(solution: RouteSolution) -> dict[str, float]:
     """What the refinement has estimated besides the poses, for reports: name, with its unit, to value."""
     noise = solution.noise
-    return {
+    estimates = {
         "odometry_along_m_per_root_m": noise.along,
         "odometry_across_m_per_root_m": noise.across,
         "odometry_heading_rad_per_root_m": noise.heading,
@@ -154,3 +157,7 @@ def _estimates(solution: RouteSolution) -> dict[str, float]:
         "gyro_gain_error": float(solution.state.gyro[0]),
         "gyro_bias_radps": float(solution.state.gyro[1]),
     }
+    if noise.closure_along_factor is None:
+        return estimates
+    read = {"slip_m": float(solution.state.gyro[GYRO]), "closure_along_sigma_factor": noise.closure_along_factor}
+    return {**estimates, **read}

@@ -129,7 +129,8 @@ def _refined(
             state, factor = gauss_newton_step(state, visits, closures, targets, noise, scale_step_variance)
         noise, scale_step_variance = estimate_noise(state, visits, closures, targets, noise, scale_step_variance, factor)
     covariance = posterior_covariance(state, all_factors(state, visits, closures, targets, noise, scale_step_variance), closures)
-    return RouteSolution(state, arc_m, noise, with_systematic_errors(covariance))
+    was_read = None if targets.read is None else np.isfinite(targets.read.across_sigma_m)
+    return RouteSolution(state, arc_m, noise, with_systematic_errors(covariance, was_read))
 
 
 def prior_scale_step_variance(state: State, visits: Visits, noise: Noise) -> FloatArray:

@@ -20,7 +20,7 @@ from hippodrome.core.solvers.robust import geman_mcclure_weight
 from hippodrome.core.types import Float32Array, FloatArray, LaneReadings
 
 LANE_SIGMA_M: Final = 0.06  # errors that the readings of one street share
-LANE_SIGMA_RAD: Final = 0.015
+LANE_SIGMA_RAD: Final = 0.03  # lanes are drawn in straight pieces, whose directions jump
 END_SIGMA_M: Final = {LaneEnd.STOP_LINE: 0.1, LaneEnd.MOUTH: 0.3}  # errors of where the network ends a lane, and of the reading
 BEND_SHIFT_M: Final = 0.3  # along a bend, between the lane as it is drawn, in straight pieces, and as it is painted
 LOOSE_RAD_PER_M: Final = 0.1  # of the heading, for each metre by which the keyframes may be elsewhere on the line

@@ -44,7 +44,19 @@ class SolverConfig:
     unvouched_weight: float = 1e-6  # weight of the road where nothing vouches for it: it determines a pose without pulling it
     survey_sigma_m: float | None = None  # sigma per axis of the error of the road network; None: what the network says of itself
     survey_length_m: float = 60.0  # correlation length of that error: neighbouring roads are drawn wrong alike
-    reading_loose_m: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.0, 0.0)  # of what was read, per round
+    reading_loose_m: tuple[float, ...] = (
+        1.0,
+        1.0,
+        1.0,
+        1.0,
+        0.7,
+        0.5,
+        0.3,
+        0.2,
+        0.1,
+        0.0,
+        0.0,
+    )  # added to what was read
 
     @property
     def survey_slope(self) -> float:

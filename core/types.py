@@ -178,12 +178,28 @@ class Edges(ShortRepr):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LaneReadings(ShortRepr):
+    """The lane as it was read in the frame of each visit; a variance of inf and a value of nan where nothing was read."""
+
+    offset_m: Float32Array  # (S,) of the rear axle from the middle of its lane, left positive
+    offset_variance_m2: Float32Array  # (S,)
+    heading_rad: Float32Array  # (S,) of the vehicle against the lane, counter-clockwise positive
+    heading_variance_rad2: Float32Array  # (S,)
+    curvature_1pm: Float32Array  # (S,) of the lane, left positive
+    curvature_change_1pm2: Float32Array  # (S,) of the curvature along the lane
+    end_m: Float32Array  # (S,) from the rear axle along the lane to its stop line or its junction's mouth
+    end_variance_m2: Float32Array  # (S,)
+    end: UInt8Array  # (S,) 0 nothing, 1 stop line, 2 mouth
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Visits(ShortRepr):
     """The time-ordered visit sequence with *raw* relative motions, undistorted by closures or the attractor read-out."""
 
     t_s: FloatArray  # (S,)
     vertex: IntArray  # (S,)
     motion: FloatArray  # (S, 3) body motion since the previous visit, map units and rad; row 0 is zero
+    lane: LaneReadings | None = None  # what was read of the road, if it was
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -7,12 +7,14 @@ from math import prod
 
 import numpy as np
 
-from hippodrome.core.types import CognitiveMap, EdgeKind, MatchStatus, RoadMatch
+from hippodrome.core.types import CognitiveMap, EdgeKind, LaneReadings, MatchStatus, RoadMatch
 from hippodrome.proto.arrays import Array, FieldError
 
 MOST_SECONDS = 1e11  # of a time stamp: the year 5138
 MOST_UNITS = 1e9  # of a position or a motion, in units of any length from a millimetre up; squares of it are still exact enough
 MOST_LOG_SCALE = 50.0  # ln of metres per unit
+MOST_METRES_READ = 1e3  # of a place or an end of a lane that was read
+MOST_END = 2  # kinds of ends of a lane
 MAX_DESCRIPTOR_DIMENSIONS = 8  # rows, columns, bins and room to grow
 
 
@@ -39,6 +41,8 @@ def check_map(cognitive_map: CognitiveMap) -> None:
         _require(np.abs(array) <= most, name, f"beyond {most:g}, which no vehicle does")
     _require(np.diff(cognitive_map.visits.t_s) >= 0.0, "visits.t_s", "followed by an earlier one")
     _require(edges.sigma > 0.0, "edges.sigma", "not above zero")
+    if cognitive_map.visits.lane is not None:
+        _check_readings(cognitive_map.visits.lane)
     if cognitive_map.road_match is not None:
         _check_road_match(cognitive_map.road_match)
 
@@ -52,6 +56,20 @@ def _magnitudes(cognitive_map: CognitiveMap) -> Iterator[tuple[str, Array, float
     yield "visits.motion", cognitive_map.visits.motion, MOST_UNITS
     if cognitive_map.log_scale is not None:
         yield "log_scale", cognitive_map.log_scale, MOST_LOG_SCALE
+
+
+def _check_readings(read: LaneReadings) -> None:
+    """Raise ``FieldError`` where a variance is none, or where one is finite though its value is not, or is one of no vehicle."""
+    for value, variance in (
+        ("offset_m", "offset_variance_m2"),
+        ("heading_rad", "heading_variance_rad2"),
+        ("end_m", "end_variance_m2"),
+    ):
+        told, spread = getattr(read, value), getattr(read, variance)
+        _require(spread > 0.0, f"visits.lane.{variance}", "not above zero")
+        _require(np.isfinite(told) | np.isinf(spread), f"visits.lane.{value}", "not finite, though its variance is")
+        _require((np.abs(told) <= MOST_METRES_READ) | ~np.isfinite(told), f"visits.lane.{value}", "farther than a camera reads")
+    _require(read.end <= MOST_END, "visits.lane.end", f"outside 0..{MOST_END}")
 
 
 def _check_road_match(match: RoadMatch) -> None:

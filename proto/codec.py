@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,6 +14,7 @@ from hippodrome.core.types import (
     CognitiveMap,
     Edges,
     HippodromeError,
+    LaneReadings,
     RoadMatch,
     ViewCells,
     Visits,
@@ -20,7 +22,17 @@ from hippodrome.core.types import (
 from hippodrome.proto import cognitive_map_pb2 as wire
 from hippodrome.proto.arrays import FieldError, pack, unpack
 from hippodrome.proto.checks import MAX_DESCRIPTOR_DIMENSIONS, check_map
-from hippodrome.proto.layout import ATTRACTORS, EDGES, REFINED_VERTICES, ROAD_MATCH, TEMPLATE_TYPES, VERTICES, VISITS, Layout
+from hippodrome.proto.layout import (
+    ATTRACTORS,
+    EDGES,
+    LANE_READINGS,
+    REFINED_VERTICES,
+    ROAD_MATCH,
+    TEMPLATE_TYPES,
+    VERTICES,
+    VISITS,
+    Layout,
+)
 from hippodrome.proto.migrate import migrate
 from hippodrome.proto.pbstream import PbstreamError, read_stream, write_stream
 
@@ -69,7 +81,7 @@ def encode_map(cognitive_map: CognitiveMap, provenance: Mapping[str, str]) -> li
         wire.Attractors(**_packed(cognitive_map.attractors, ATTRACTORS, header)),
         vertices,
         wire.Edges(**_packed(cognitive_map.edges, EDGES, header)),
-        wire.Visits(**_packed(cognitive_map.visits, VISITS, header)),
+        _encode_visits(cognitive_map.visits, header),
     ]
     if (match := cognitive_map.road_match) is not None:
         names = b"".join(lane_id.encode() + b"\0" for lane_id in match.lane_ids)
@@ -89,7 +101,7 @@ def decode_map(messages: Sequence[Any]) -> tuple[CognitiveMap, dict[str, str]]:
         **_unpacked(vertices, VERTICES, header),
         view_cells=_decode_view_cells(view_cells, header),
         edges=Edges(**_unpacked(edges, EDGES, header)),
-        visits=Visits(**_unpacked(visits, VISITS, header)),
+        visits=_decode_visits(visits, header),
         attractors=AttractorStates(**_unpacked(attractors, ATTRACTORS, header)),
         **refined,
         road_match=_decode_road_match(messages[6], header) if header.has_road_match else None,
@@ -142,6 +154,22 @@ def _decode_view_cells(message: wire.ViewCells, header: wire.Header) -> ViewCell
         mean=unpack(message.mean, "float32", (header.descriptor_size,), "mean"),
         shape=tuple(message.shape),
     )
+
+
+def _encode_visits(visits: Visits, header: wire.Header) -> wire.Visits:
+    message = wire.Visits()
+    for field, data in _packed(visits, VISITS, header).items():
+        setattr(message, field, data)
+    if visits.lane is not None:
+        message.lane.CopyFrom(wire.LaneReadings(**_packed(visits.lane, LANE_READINGS, header)))
+    return message
+
+
+def _decode_visits(message: wire.Visits, header: wire.Header) -> Visits:
+    visits = Visits(**_unpacked(message, VISITS, header))
+    if message.HasField("lane"):
+        visits = replace(visits, lane=LaneReadings(**_unpacked(message.lane, LANE_READINGS, header)))
+    return visits
 
 
 def _decode_road_match(message: wire.RoadMatch, header: wire.Header) -> RoadMatch:

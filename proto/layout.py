@@ -36,6 +36,17 @@ VISITS: Layout = (
     ("vertex", "int32", ("visits",)),
     ("motion", "float64", ("visits", 3)),
 )
+LANE_READINGS: Layout = (
+    ("offset_m", "float32", ("visits",)),
+    ("offset_variance_m2", "float32", ("visits",)),
+    ("heading_rad", "float32", ("visits",)),
+    ("heading_variance_rad2", "float32", ("visits",)),
+    ("curvature_1pm", "float32", ("visits",)),
+    ("curvature_change_1pm2", "float32", ("visits",)),
+    ("end_m", "float32", ("visits",)),
+    ("end_variance_m2", "float32", ("visits",)),
+    ("end", "uint8", ("visits",)),
+)
 ROAD_MATCH: Layout = (
     ("lane", "int32", ("vertices",)),
     ("position_m", "float64", ("vertices",)),

@@ -84,18 +84,22 @@ class Scenario(Spec):
 
     @model_validator(mode="before")
     @classmethod
-    def _localizer_knows_the_camera(cls, data: Any) -> Any:
-        """The camera of a simulated drive is known, so the localizer reads the road in its frames; one askew sees other road."""
+    def _camera_is_known(cls, data: Any) -> Any:
+        """The camera of a simulated drive is known, so mapper and localizer read the road; one askew sees other road."""
         if not isinstance(data, dict):
             return data
-        localizer, camera = data.get("localizer", {}), data.get("camera", {})
+        camera = data.get("camera", {})
         camera = camera.model_dump() if isinstance(camera, CameraSpec) else camera
-        if not (isinstance(localizer, dict) and isinstance(camera, dict)):
+        if not isinstance(camera, dict):
             return data
-        is_recorded = getattr(data.get("localization"), "recording", None) or "recording" in (data.get("localization") or {})
         seat = {name: camera[name] for name in ("fov_deg", "height_m", "forward_m") if name in camera}
-        reads = not is_recorded and not camera.get("yaw_offset_deg")
-        return {**data, "localizer": {"road_reading": reads, "camera": seat, **localizer}}
+        told = {}
+        for part, role in (("localizer", "localization"), ("mapper", "mapping")):
+            own, drive = data.get(part, {}), data.get(role) or {}
+            if isinstance(own, dict):
+                is_recorded = getattr(drive, "recording", None) or (isinstance(drive, dict) and "recording" in drive)
+                told[part] = {"road_reading": not is_recorded and not camera.get("yaw_offset_deg"), "camera": seat, **own}
+        return {**data, **told}
 
     @model_validator(mode="after")
     def _rates_fit(self) -> Scenario:

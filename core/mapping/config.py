@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 from hippodrome.core.attractors.config import GRID_INFORMATION, AttractorConfig
-from hippodrome.core.views.config import KeyframeConfig, SequenceConfig, ViewCellConfig
+from hippodrome.core.views.config import CameraGeometry, KeyframeConfig, SequenceConfig, ViewCellConfig
 
 
 @dataclass(frozen=True)
@@ -101,3 +101,5 @@ class MapperConfig:
     memory: PlaceMemoryConfig = field(default_factory=PlaceMemoryConfig)
     experience_map: ExperienceMapConfig = field(default_factory=ExperienceMapConfig)
     attractor: MapperAttractorConfig = field(default_factory=MapperAttractorConfig)
+    road_reading: bool = False  # keep what the keyframes show of the lane, for the refinement; the camera must be known
+    camera: CameraGeometry = field(default_factory=CameraGeometry)  # for road_reading

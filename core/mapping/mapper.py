@@ -24,6 +24,7 @@ from hippodrome.core.mapping.experience_map import (
 )
 from hippodrome.core.mapping.memory import PlaceMemory, Recognition
 from hippodrome.core.mapping.networks import NeuralPose
+from hippodrome.core.mapping.road import RoadLog
 from hippodrome.core.types import CognitiveMap, FloatArray, Frame, HippodromeError, Observation, Visits
 from hippodrome.core.views import keyframes
 from hippodrome.core.views.descriptors import describe
@@ -44,6 +45,7 @@ class Mapper:
         self._motions: list[FloatArray] = []  # raw motion to each keyframe from the one before
         self._closures: list[Closure] = []
         self._neural: NeuralPose | None = None  # the networks now; None until they start
+        self._road = RoadLog(config.camera) if config.road_reading else None
         self._neural_at: list[NeuralPose] = []  # the networks at each keyframe, once they have started
 
     def step(self, observation: Observation) -> None:
@@ -53,7 +55,11 @@ class Mapper:
         """
         self._since_keyframe = keyframes.advance(self._since_keyframe, observation, self._config.view_step)
         self._integrate_paths(observation)
+        if self._road is not None:
+            self._road.move(observation)
         if not keyframes.is_due(self._since_keyframe, self._config.view_step) or observation.frame is None:
+            if self._road is not None and observation.frame is not None:
+                self._road.see(observation.frame)
             return
         recognitions = self._add_keyframe(observation.t_s, observation.frame)
         self._close_loops(recognitions)
@@ -82,7 +88,7 @@ class Mapper:
             view_cell=np.array(self._memory.vertex_cell, dtype=np.int32),
             view_cells=cells,
             edges=edges,
-            visits=Visits(t_s, np.arange(count, dtype=np.int32), motions),
+            visits=Visits(t_s, np.arange(count, dtype=np.int32), motions, None if self._road is None else self._road.finish()),
             attractors=networks.recorded(self._neural_at or self._reckoned_states()),
         )
 
@@ -95,6 +101,9 @@ class Mapper:
     def _add_keyframe(self, t_s: float, frame: Frame) -> list[Recognition]:
         """Add a vertex for a new keyframe; returns the recognitions that its view triggers."""
         state, vertex = self._since_keyframe, len(self._t_s)
+        if self._road is not None:
+            self._road.read(frame, state.travelled, float(state.motion[2]))
+            self._road.see(frame)
         self._t_s.append(t_s)
         self._motions.append(state.motion if vertex else np.zeros(3))
         descriptor = describe(frame, self._config.memory.view_cells)

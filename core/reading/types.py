@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
+STOP_LINE_BEFORE_END_M = 0.9  # from the near edge of a stop line to the end of its lane
+
 
 class LaneEnd(IntEnum):
     """What is seen across the lane ahead."""

@@ -25,6 +25,28 @@ class SolverConfig:
     survey_sigma_m: float | None = None  # sigma per axis of the error of the road network; None: what the network says of itself
     survey_freedom: float | None = 5.0  # errors that count as seen before the drive: how well sigma is known; None: exactly
     survey_length_m: float = 60.0  # correlation length of that error: neighbouring roads are drawn wrong alike
+    reading_loose_m: tuple[float, ...] = (
+        1.0,
+        1.0,
+        1.0,
+        1.0,
+        0.7,
+        0.5,
+        0.3,
+        0.2,
+        0.1,
+        0.0,
+        0.0,
+    )  # added sigma, per round
+
+    @property
+    def survey_slope(self) -> float:
+        """Standard deviation (rad) of the error of the drawn lanes' directions."""
+        return (self.survey_sigma_m or 0.0) / self.survey_length_m
+
+    def loose_m(self, number: int) -> float:
+        """Sigma that is added to what was read in a round."""
+        return self.reading_loose_m[number] if number < len(self.reading_loose_m) else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +81,7 @@ class RouteRefineConfig:
     search: RouteSearchConfig = field(default_factory=RouteSearchConfig)
     confidence: ConfidenceConfig = field(default_factory=ConfidenceConfig)
     solver: SolverConfig = field(default_factory=SolverConfig)
+    road_reading: bool = True  # use what the mapper read of the road, if it did: place in the lane, and the lane's end
 
 
 @dataclass(frozen=True, slots=True)

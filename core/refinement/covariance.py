@@ -9,6 +9,7 @@ import numpy as np
 
 from hippodrome.core.refinement.factors import BinaryFactors, State
 from hippodrome.core.refinement.residuals import Factors, normal_equations
+from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.solvers.chain import factorise, marginals
 from hippodrome.core.types import Edges, FloatArray
 
@@ -16,6 +17,7 @@ from hippodrome.core.types import Edges, FloatArray
 # errors are correlated along the lane, so that they never average out.
 PLACE_SIGMA_M = 0.1
 HEADING_SIGMA_RAD = 0.01  # a wander of 0.1 m over some 60 m
+READ_PLACE_SIGMA_M, READ_HEADING_SIGMA_RAD = 0.05, 0.004  # the same where the camera read the place in the lane
 
 
 def posterior_covariance(state: State, factors: Factors, closures: Edges) -> FloatArray:
@@ -62,14 +64,20 @@ def _near_end(near: FloatArray, far: FloatArray, far_covariance: FloatArray) -> 
     return whitened
 
 
-def with_systematic_errors(covariance: FloatArray) -> FloatArray:
+def with_systematic_errors(covariance: FloatArray, read: BoolArray | None = None) -> FloatArray:
     """The formal covariance (S, B, B) plus the errors that do not average out along a lane.
 
     This is the distance between the lane as driven and as drawn. It is an error across the lane, but in bends an error across the
-    lane is one along it too, so that it is added to both axes.
+    lane is one along it too, so that it is added to both axes. ``read`` (S,) masks the keyframes at which the place in the lane
+    was read; there it is smaller.
     """
     added = np.zeros_like(covariance[0])
     added[0, 0] = added[1, 1] = PLACE_SIGMA_M**2
     added[2, 2] = HEADING_SIGMA_RAD**2
     enlarged: FloatArray = covariance + added
+    if read is not None:
+        less = np.zeros_like(added)
+        less[0, 0] = less[1, 1] = READ_PLACE_SIGMA_M**2
+        less[2, 2] = READ_HEADING_SIGMA_RAD**2
+        enlarged[read] = covariance[read] + less
     return enlarged

@@ -18,7 +18,7 @@ class State:
 
     poses: FloatArray  # (S, 3) network frame, m, m, rad
     log_scale: FloatArray  # (S,) ln(metres per map unit)
-    gyro: FloatArray  # (2,) gain error g and bias b (rad/s): true turn = (1 + g) measured turn + b dt
+    gyro: FloatArray  # (2,) gain error g and bias b (rad/s): true turn = (1 + g) measured turn + b dt; (3,) with the slip (m)
     map_error_m: FloatArray | None = None  # (S, 2) drawn place of the road less its true one; None: the map is taken as exact
 
     @property
@@ -49,7 +49,7 @@ class BinaryFactors:
     residual: FloatArray  # (N, M) whitened, times the root of the weight
     source: FloatArray  # (N, M, 4 or 6) Jacobian by the source's unknowns, likewise
     target: FloatArray  # (N, M, 4 or 6) Jacobian by the target's unknowns
-    gyro: FloatArray  # (N, M, 2) Jacobian by the gyro's gain error and bias
+    gyro: FloatArray  # (N, M, 2 or 3) Jacobian by the gyro's gain error and bias, and the slip
     weight: FloatArray  # (N, M) robust weights
 
 

@@ -16,7 +16,11 @@ STANDSTILL_M = 0.1  # shorter steps are as uncertain as one of this length: quan
 # as closely as it likes, so that the residuals do not show that a driver wanders and a network is off by decimetres.
 FLOORS = {"along": 0.005, "across": 0.005, "heading": 0.0005, "log_scale": 0.0003, "lateral_m": 0.2, "lane_heading_rad": 0.05}
 
+
+CHI_SQ_1_MEDIAN = 0.455  # the same with 1
 CHI_SQ_3_MEDIAN = 2.366  # median of a chi-squared distribution with 3 degrees of freedom
+# Keyframes move along the road until they fit their closures, so that what is left tells too little of the closures' error there.
+LEAST_ALONG_FACTOR = 0.65
 LARGEST_CHANGE = 2.0  # factor by which one estimate may change a sigma at most
 
 
@@ -34,6 +38,7 @@ class Noise:
     lateral_m: float = 0.3  # lateral sigma: the vehicle's distance from the lane's centreline
     lane_heading_rad: float = 0.05  # the vehicle's heading against the lane's direction
     closure_factor: float = 1.0  # factor on the closures' own sigmas
+    closure_along_factor: float | None = None  # the same along the road, where it is estimated apart; None: as the others
     scale_inverse_freedom: float = 0.25  # 1 / degrees of freedom (Student-t) of the scale's steps, which may jump; 0: normal
     road_inverse_freedom: float = 1.0  # the same of the road's residuals: 1 is Cauchy, as turns are drawn otherwise than driven
 
@@ -76,7 +81,9 @@ def variance_factors(residual: FloatArray, count: float, freedom_used: FloatArra
     return factor
 
 
-def rescaled(noise: Noise, odometry: FloatArray, road: FloatArray, closure_median_sq: float | None) -> Noise:
+def rescaled(
+    noise: Noise, odometry: FloatArray, road: FloatArray, closure_median_sq: float | None, along_median_sq: float | None = None
+) -> Noise:
     """The noise with its sigmas times the roots of variance factors, kept above ``FLOORS``.
 
     Args:
@@ -85,6 +92,7 @@ def rescaled(noise: Noise, odometry: FloatArray, road: FloatArray, closure_media
         road: variance factors of the road: across the lane and heading, (2,) or more; the rest is ignored.
         closure_median_sq: median over the closures of their squared whitened residual of three components, without robust weight;
             None without closures. A median, as closures may be false.
+        along_median_sq: the same of the component along the road alone.
     """
     names = ("along", "across", "heading", "log_scale", "lateral_m", "lane_heading_rad")
     factors = np.sqrt(np.concatenate([odometry, road[:2]]))
@@ -92,4 +100,7 @@ def rescaled(noise: Noise, odometry: FloatArray, road: FloatArray, closure_media
     closure_factor = noise.closure_factor
     if closure_median_sq is not None:
         closure_factor = float(np.clip(closure_factor * np.sqrt(closure_median_sq / CHI_SQ_3_MEDIAN), 0.2, 5.0))
-    return replace(noise, **updates, closure_factor=closure_factor)
+    along_factor = noise.closure_along_factor
+    if along_factor is not None and along_median_sq is not None:
+        along_factor = float(np.clip(along_factor * np.sqrt(along_median_sq / CHI_SQ_1_MEDIAN), LEAST_ALONG_FACTOR, 5.0))
+    return replace(noise, **updates, closure_factor=closure_factor, closure_along_factor=along_factor)

@@ -17,6 +17,7 @@ import numpy as np
 from hippodrome.core.refinement.factors import BinaryFactors, State, UnaryFactors, normal_blocks
 from hippodrome.core.refinement.map_error import MapErrorFactors, MapErrorModel, add_map_error, map_error_factors
 from hippodrome.core.refinement.noise import Noise
+from hippodrome.core.refinement.readings import ReadTargets, reading_factors
 from hippodrome.core.se2 import between, wrap
 from hippodrome.core.solvers.chain import ChainSystem
 from hippodrome.core.solvers.robust import geman_mcclure_weight, student_weight
@@ -24,6 +25,8 @@ from hippodrome.core.types import Edges, FloatArray, Visits
 
 GAIN_SIGMA = 0.05  # prior sigma of the gyro's gain error: cheap gyros are calibrated to a few percent
 BIAS_SIGMA_RADPS = 0.02  # prior sigma of the gyro's bias: about 1 deg/s
+SLIP_SIGMA_M = 0.1  # prior sigma of the slip (``odometry_factors``)
+GYRO = 2  # the gyro's gain error and bias are the first entries of ``State.gyro``; the slip follows them
 GEMAN_MCCLURE = 3.0  # error of a closure in sigmas at which it has lost three quarters of its weight
 
 
@@ -38,6 +41,7 @@ class RoadTargets:
     weight: FloatArray  # (S,) 1, or next to 0 where nothing vouches for the road
     along_sigma_m: float  # sigma along the lane; infinite: the keyframe is drawn to the line, not to a point of it
     map_error: MapErrorModel | None = None  # None: the map is taken as exact
+    read: ReadTargets | None = None  # what the camera read of the road
 
 
 class Factors(NamedTuple):
@@ -47,6 +51,7 @@ class Factors(NamedTuple):
     road: UnaryFactors  # on each keyframe
     closures: BinaryFactors  # along the closure edges
     map_error: MapErrorFactors | None = None  # where the map is not taken as exact
+    read: UnaryFactors | None = None  # where the road was read
 
 
 def all_factors(
@@ -58,6 +63,7 @@ def all_factors(
         road_factors(state, targets, noise),
         closure_factors(state, closures, noise),
         None if targets.map_error is None else map_error_factors(state, visits, closures, targets.map_error),
+        None if targets.read is None else reading_factors(state, targets.points_m, targets.heading_rad, targets.read),
     )
 
 
@@ -67,6 +73,10 @@ def odometry_factors(state: State, visits: Visits, noise: Noise, scale_step_vari
         r_i = Sigma_i^(-1/2) (R_i^T (p_{i+1} - p_i) - e^{s_i} m_i,
                               warp(psi_{i+1} - psi_i - (1 + g) w_i - b dt_i),
                               s_{i+1} - s_i)
+
+    Where the road was read, the slip l is unknown, too: l (cos w_i - 1, sin w_i) is taken from the first two. It is how far ahead
+    of the pose's point that point of the vehicle lies which moves the way the vehicle heads; tyres and the seats of the sensors
+    decide it. Without it all corners are laid a decimetre too soon or too late, which the place in the next street shows.
 
     m_i (map units) and w_i (rad) are the raw motion and turn, dt_i (s) the time between the keyframes. Only the steps of the log
     scale have a Student-t weight, as the scale may jump. Gyros and wheels have no outliers: where the road disagrees with a
@@ -83,13 +93,17 @@ def odometry_factors(state: State, visits: Visits, noise: Noise, scale_step_vari
     a, b = state.poses[:-1], state.poses[1:]
     motion, dt = visits.motion[1:], np.diff(visits.t_s)
     seen, metres = between(a, b), np.exp(state.log_scale[:-1])[:, None] * motion[:, :2]
+    swing = np.column_stack([np.cos(motion[:, 2]) - 1.0, np.sin(motion[:, 2])])  # of a point a metre ahead, as the vehicle turns
     turn = wrap(b[:, 2] - a[:, 2] - (1.0 + state.gyro[0]) * motion[:, 2] - state.gyro[1] * dt)
     residual = np.column_stack([seen[:, :2] - metres, turn, np.diff(state.log_scale)])
+    if len(state.gyro) > GYRO:
+        residual[:, :2] -= state.gyro[GYRO] * swing
     source, target = _relative_pose_jacobians(a, seen, state.width)
     source[:, :2, 3] = -metres
     source[:, 3, 3], target[:, 3, 3] = -1.0, 1.0
-    gyro = np.zeros((len(a), 4, 2))
+    gyro = np.zeros((len(a), 4, len(state.gyro)))
     gyro[:, 2, 0], gyro[:, 2, 1] = -motion[:, 2], -dt
+    gyro[:, :2, GYRO:] = -swing[:, :, None]
     per_sigma = 1.0 / noise.step_sigmas(np.hypot(metres[:, 0], metres[:, 1]))
     weight = np.ones_like(residual)
     expected_sq = (residual[:, 3] ** 2 + scale_step_variance) * per_sigma[:, 3] ** 2
@@ -141,6 +155,8 @@ def closure_factors(state: State, closures: Edges, noise: Noise) -> BinaryFactor
     source, target = source[:, :3], target[:, :3]
     source[:, :2, 3] = -metres
     per_sigma = 1.0 / (noise.closure_factor * np.column_stack([scale * closures.sigma[:, :2], closures.sigma[:, 2]]))
+    if noise.closure_along_factor is not None:
+        per_sigma[:, 0] *= noise.closure_factor / noise.closure_along_factor
     weight = geman_mcclure_weight(np.sum((residual * per_sigma) ** 2, axis=1), GEMAN_MCCLURE**2)
     gain = per_sigma * np.sqrt(weight)[:, None]
     no_gyro, weights = np.zeros((len(a), 3, 2)), np.repeat(weight[:, None], 3, 1)
@@ -152,8 +168,11 @@ def normal_equations(state: State, factors: Factors, closures: Edges) -> ChainSy
 
     The coupling J_a^T J_b between the two ends of a closure lies off the chain and is left out: the solver adds it.
     """
-    odometry, road, closing, map_error = factors
+    odometry, road, closing, map_error, read = factors
     diagonal, rhs = normal_blocks(road.jacobian, road.residual)
+    if read is not None:
+        read_diagonal, read_rhs = normal_blocks(read.jacobian, read.residual)
+        diagonal, rhs = diagonal + read_diagonal, rhs + read_rhs
     by_source, rhs_source = normal_blocks(odometry.source, odometry.residual)
     by_target, rhs_target = normal_blocks(odometry.target, odometry.residual)
     diagonal[:-1] += by_source
@@ -167,10 +186,10 @@ def normal_equations(state: State, factors: Factors, closures: Edges) -> ChainSy
     upper = np.einsum("nmi,nmj->nij", odometry.source, odometry.target)
     if map_error is not None:
         add_map_error(map_error, closures, diagonal, upper, rhs)
-    border = np.zeros((len(state.poses), state.width, 2))
+    border = np.zeros((len(state.poses), state.width, len(state.gyro)))
     border[:-1] += np.einsum("nmi,nmg->nig", odometry.source, odometry.gyro)
     border[1:] += np.einsum("nmi,nmg->nig", odometry.target, odometry.gyro)
-    prior = np.array([GAIN_SIGMA, BIAS_SIGMA_RADPS]) ** -2.0
+    prior = np.array([GAIN_SIGMA, BIAS_SIGMA_RADPS, SLIP_SIGMA_M][: len(state.gyro)]) ** -2.0
     return ChainSystem(
         diagonal=diagonal,
         upper=upper,

@@ -19,6 +19,7 @@ from hippodrome.core.matching.search.problem import search_problem
 from hippodrome.core.matching.search.route import Route, most_likely_drive
 from hippodrome.core.refinement.config import RouteRefineConfig
 from hippodrome.core.refinement.edges import edges_where
+from hippodrome.core.refinement.residuals import GYRO
 from hippodrome.core.refinement.solver import RouteSolution, refine_along_route
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import (
@@ -55,13 +56,14 @@ def refine_route(
     solver = config.solver
     if solver.survey_sigma_m is None:
         solver = replace(solver, survey_sigma_m=network.survey_sigma_m)
-    solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver)
+    read = network if config.road_reading else None
+    solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver, read)
     if np.any(free):
         drawn = np.column_stack([solution.state.drawn_points_m, solution.state.poses[:, 2]])
         chosen = choose_lanes(drawn, vouched > 0.0, network, config.search)
         line, arc = _line_and_places(chosen, network)
         log_scale, free = solution.state.log_scale, near_lane_changes(line, network)
-        solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver)
+        solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver, read)
     status = reject_displaced(status, route, solution.state.drawn_points_m, config.confidence)
     status = reject_uncertain(status, solution.assumed_covariance[:, :2, :2], config.confidence)
     return _refinement(cognitive_map, network, line, solution, status)
@@ -132,7 +134,7 @@ def _estimates(solution: RouteSolution) -> dict[str, float]:
     """What the refinement has estimated besides the poses, for reports: name, with its unit, to value."""
     noise, shown_m = solution.noise, solution.shown_survey_sigma_m
     of_map = {} if shown_m is None else {"survey_sigma_m": shown_m}
-    return {
+    estimates = {
         "odometry_along_m_per_root_m": noise.along,
         "odometry_across_m_per_root_m": noise.across,
         "odometry_heading_rad_per_root_m": noise.heading,
@@ -144,3 +146,7 @@ def _estimates(solution: RouteSolution) -> dict[str, float]:
         "gyro_bias_radps": float(solution.state.gyro[1]),
         **of_map,
     }
+    if noise.closure_along_factor is None:
+        return estimates
+    read = {"slip_m": float(solution.state.gyro[GYRO]), "closure_along_sigma_factor": noise.closure_along_factor}
+    return {**estimates, **read}

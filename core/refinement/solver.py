@@ -15,6 +15,7 @@ from hippodrome.core.refinement.covariance import posterior_covariance, with_sys
 from hippodrome.core.refinement.factors import State
 from hippodrome.core.refinement.map_error import MapErrorModel, driven_m, map_error_factors, shown_sigma_m
 from hippodrome.core.refinement.noise import Noise, rescaled, variance_factors
+from hippodrome.core.refinement.readings import ReadLanes
 from hippodrome.core.refinement.residuals import (
     Factors,
     RoadTargets,
@@ -22,7 +23,7 @@ from hippodrome.core.refinement.residuals import (
     normal_equations,
     stepped,
 )
-from hippodrome.core.roads.network import BoolArray
+from hippodrome.core.roads.network import BoolArray, RoadNetwork
 from hippodrome.core.solvers.chain import ChainFactor, marginals, solve_coupled
 from hippodrome.core.types import Edges, FloatArray, Visits
 
@@ -52,6 +53,7 @@ def refine_along_route(
     vouched: FloatArray,
     free: BoolArray,
     config: SolverConfig,
+    network: RoadNetwork | None = None,
 ) -> RouteSolution:
     """The most likely poses and scales of S keyframes along a route, with their covariances and the noise of all factors.
 
@@ -68,13 +70,14 @@ def refine_along_route(
         vouched: 1 where a keyframe is believed to be on the road of the route, 0 where it may be off the network, (S,).
         free: mask (P,) of the samples of the line whose lane may be the wrong one of several parallel ones.
         config: number and constants of the rounds; without ``survey_sigma_m`` the line is taken as exact.
+        network: the roads of the line, if what was read of them is to be used.
 
     Where the whole line is straight, nothing tells how far along it the keyframes are, nor their scale. They are then held to
     where the search has put them, loosely, so that a large covariance says so.
     """
     for most_sigma_m in (np.inf, *_HELD_SIGMAS_M):
         held = replace(config, along_sigma_m=tuple(min(sigma_m, most_sigma_m) for sigma_m in config.along_sigma_m))
-        solution = _refined(visits, closures, line, arc_m, log_scale, vouched, free, held)
+        solution = _refined(visits, closures, line, arc_m, log_scale, vouched, free, held, network)
         if np.isfinite(solution.state.poses).all() and np.isfinite(solution.covariance).all():
             break
     return solution
@@ -82,21 +85,24 @@ def refine_along_route(
 
 def _refined(
     visits: Visits, closures: Edges, line: RouteLine, arc_m: FloatArray, log_scale: FloatArray, vouched: FloatArray,
-    free: BoolArray, config: SolverConfig,
+    free: BoolArray, config: SolverConfig, network: RoadNetwork | None,
 ) -> RouteSolution:  # fmt: skip
     """As ``refine_along_route``; not finite if the line leaves the unknowns open."""
     points, heading = points_on_line(line, arc_m)
     map_error = MapErrorModel(config.survey_sigma_m, config.survey_length_m) if config.survey_sigma_m else None
+    readings = None if network is None or visits.lane is None else ReadLanes(visits.lane, line, network, config.survey_slope)
     no_error_yet = None if map_error is None else np.zeros_like(points)
-    state = State(np.column_stack([points, heading]), log_scale, np.zeros(2), no_error_yet)
-    noise = Noise()
+    state = State(np.column_stack([points, heading]), log_scale, np.zeros(2 if readings is None else 3), no_error_yet)
+    noise = Noise() if readings is None else Noise(closure_along_factor=1.0)
     scale_step_variance = prior_scale_step_variance(state, visits, noise)
     road_weight = np.maximum(vouched, config.unvouched_weight)
-    for along_sigma_m in config.along_sigma_m:
+    for number, along_sigma_m in enumerate(config.along_sigma_m):
         arc_m = reproject(line, state.drawn_points_m, arc_m, config.reprojection_m)
         points, heading = points_on_line(line, arc_m)
         added_lateral_m = unknown_lane_sigma_m(line, arc_m, free)
-        targets = RoadTargets(points, heading, curvature(line, arc_m), added_lateral_m, road_weight, along_sigma_m, map_error)
+        bend = curvature(line, arc_m)
+        read = None if readings is None else readings.at(arc_m, bend, added_lateral_m, config.loose_m(number))
+        targets = RoadTargets(points, heading, bend, added_lateral_m, road_weight, along_sigma_m, map_error, read)
         for _ in range(config.inner_iterations):
             state, factor = gauss_newton_step(state, visits, closures, targets, noise, scale_step_variance)
         noise, scale_step_variance = estimate_noise(state, visits, closures, targets, noise, scale_step_variance, factor)
@@ -107,9 +113,9 @@ def _refined(
         shown_m = shown_sigma_m(map_error, config.survey_freedom, state, assumed, noise, visits)
         shown = map_error_factors(state, visits, closures, replace(map_error, sigma_m=shown_m))
         covariance = posterior_covariance(state, factors._replace(map_error=shown), closures)
-    return RouteSolution(
-        state, arc_m, noise, with_systematic_errors(covariance), with_systematic_errors(assumed), shown_survey_sigma_m=shown_m
-    )
+    was_read = None if targets.read is None else np.isfinite(targets.read.across_sigma_m)
+    told, as_assumed = (with_systematic_errors(one, was_read) for one in (covariance, assumed))
+    return RouteSolution(state, arc_m, noise, told, as_assumed, shown_survey_sigma_m=shown_m)
 
 
 def prior_scale_step_variance(state: State, visits: Visits, noise: Noise) -> FloatArray:
@@ -187,18 +193,20 @@ def estimate_noise(
     For a step of the log scale, J Sigma J^T over its robust weight and times its prior variance is its posterior variance. The
     next round adds it to the squared step when it sets the robust weight (``odometry_factors``).
     """
-    odometry, road, closing, _ = all_factors(state, visits, closures, targets, noise, scale_step_variance)
+    odometry, road, closing, _, _ = all_factors(state, visits, closures, targets, noise, scale_step_variance)
     own, next_ = marginals(factor)
     joint = np.block([[own[:-1], next_], [np.swapaxes(next_, 1, 2), own[1:]]])
     jacobian = np.concatenate([odometry.source, odometry.target], axis=2)
     odometry_used = np.einsum("nmi,nij,nmj->nm", jacobian, joint, jacobian)
     road_used = np.einsum("nmi,nij,nmj->m", road.jacobian, own, road.jacobian)
+    each_sq = closing.residual**2 / np.maximum(closing.weight[:, :1], 1e-12)
     unweighted_sq = np.sum(closing.residual**2, axis=1) / np.maximum(closing.weight[:, 0], 1e-12)
     updated = rescaled(
         noise,
         variance_factors(odometry.residual, len(odometry.residual), np.sum(odometry_used, axis=0)),
         variance_factors(road.residual, float(np.sum(targets.weight)), road_used),
         float(np.median(unweighted_sq)) if len(unweighted_sq) else None,
+        float(np.median(each_sq[:, 0])) if len(unweighted_sq) else None,
     )
     return updated, odometry_used[:, 3] / odometry.weight[:, 3] * prior_scale_step_variance(state, visits, noise)
 

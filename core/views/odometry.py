@@ -189,10 +189,7 @@ def estimate_step(
         focal_px: focal length of the camera in pixels.
         camera: where it sits.
     """
-    strip = _road_from_above(before, 0.0, focal_px, camera)
-    template = _road_from_above(after, turn_rad, focal_px, camera)[: round(TEMPLATE_M / PIXEL_M), BESIDE_PX:-BESIDE_PX]
-    correlation = cv2.matchTemplate(strip, template, cv2.TM_CCOEFF_NORMED)
-    agreement = correlation[:, BESIDE_PX - PLAY_PX : BESIDE_PX + PLAY_PX + 1].max(axis=1)
+    agreement = _agreement(before, after, turn_rad, focal_px, camera)
     shift_m = PIXEL_M * np.arange(len(agreement))
     change_m = np.abs(shift_m - expected_m)
     possible = (shift_m >= LEAST_STEP_M) & (change_m <= LARGEST_CHANGE_M)
@@ -201,6 +198,30 @@ def estimate_step(
     if agreement[best] < LEAST_CORRELATION or not possible[best]:
         return expected_m
     return PIXEL_M * (best + peak_in_row(agreement, best))
+
+
+def seen_step(before: Grey, after: Grey, turn_rad: float, camera: CameraGeometry) -> tuple[float, float]:
+    """Metres along the arc between two frames about which nothing is expected, and how well the frames agree there, up to 1.
+
+    Arguments as of ``estimate_step``. The answer is wrong now and then, as one stretch of road looks like the next.
+    """
+    agreement = _agreement(before, after, turn_rad, camera.focal_px(after.shape[1]), camera)
+    best = int(np.argmax(agreement))
+    return PIXEL_M * (best + peak_in_row(agreement, best)), float(agreement[best])
+
+
+def _agreement(before: Grey, after: Grey, turn_rad: float, focal_px: float, camera: CameraGeometry) -> Float32Array:
+    """Correlation (K,) of the road in two frames, seen from above, for each shift along the road in steps of ``PIXEL_M``."""
+    strip = _road_from_above(before, 0.0, focal_px, camera)
+    template = _road_from_above(after, turn_rad, focal_px, camera)[: round(TEMPLATE_M / PIXEL_M), BESIDE_PX:-BESIDE_PX]
+    correlation = cv2.matchTemplate(strip, template, cv2.TM_CCOEFF_NORMED)
+    agreement: Float32Array = correlation[:, BESIDE_PX - PLAY_PX : BESIDE_PX + PLAY_PX + 1].max(axis=1)
+    return agreement
+
+
+def grey_image(frame: Frame) -> Grey:
+    """The frame in grey."""
+    return _grey(frame)
 
 
 def _road_from_above(image: Grey, turn_rad: float, focal_px: float, camera: CameraGeometry) -> Float32Array:

@@ -4,10 +4,12 @@ from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 
-from hippodrome.core.types import AttractorStates, CognitiveMap, Edges, RoadMatch, ViewCells, Visits
+from hippodrome.core.types import AttractorStates, CognitiveMap, Edges, LaneReadings, RoadMatch, ViewCells, Visits
 
 
-def random_map(seed=0, vertices=5, cells=4, edges=6, visits=7, modules=2, shape=(2, 3), kind="gradient", refined=False, lanes=3):
+def random_map(
+    seed=0, vertices=5, cells=4, edges=6, visits=7, modules=2, shape=(2, 3), kind="gradient", refined=False, lanes=3, read=False
+):
     """A map with arbitrary content that the checks accept."""
     rng = np.random.default_rng(seed)
     size = int(np.prod(shape))
@@ -39,6 +41,8 @@ def random_map(seed=0, vertices=5, cells=4, edges=6, visits=7, modules=2, shape=
             single(vertices, modules, 2, 2),
         ),
     )
+    if read:
+        cognitive_map = replace(cognitive_map, visits=replace(cognitive_map.visits, lane=random_readings(rng, visits)))
     if not refined:
         return cognitive_map
     lane = rng.integers(-1, lanes, vertices).astype(np.int32)
@@ -50,6 +54,17 @@ def random_map(seed=0, vertices=5, cells=4, edges=6, visits=7, modules=2, shape=
     )
     covariance = rng.normal(size=(vertices, 3, 3))
     return replace(cognitive_map, frame="network", log_scale=rng.normal(size=vertices), covariance=covariance, road_match=match)
+
+
+def random_readings(rng, count):
+    """Readings of which some saw nothing."""
+    seen = rng.random(count) < 0.7
+    value = lambda: np.where(seen, rng.normal(size=count), np.nan).astype(np.float32)  # noqa: E731
+    variance = lambda: np.where(seen, rng.uniform(0.01, 1.0, count), np.inf).astype(np.float32)  # noqa: E731
+    pairs = [part for _ in range(2) for part in (value(), variance())]
+    return LaneReadings(
+        *pairs, value(), value(), value(), variance(), np.where(seen, rng.integers(0, 3, count), 0).astype(np.uint8)
+    )
 
 
 def assert_same(a, b):

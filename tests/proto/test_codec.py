@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from maps import assert_same, random_map
 
-from hippodrome.core.types import HippodromeError
+from hippodrome.core.types import HippodromeError, LaneReadings
 from hippodrome.proto import cognitive_map_pb2 as wire
 from hippodrome.proto.codec import FORMAT_VERSION, load_map, save_map
 from hippodrome.proto.pbstream import MAGIC, read_stream, stream_bytes
@@ -29,6 +29,7 @@ maps = st.builds(
     kind=st.sampled_from(["gradient", "grey"]),
     refined=st.booleans(),
     lanes=st.integers(1, 4),
+    read=st.booleans(),
 )
 
 
@@ -209,3 +210,37 @@ def saved(tmp_path, **shape):
     path = tmp_path / "map.pbstream"
     save_map(path, random_map(**shape), PROVENANCE)
     return path, path.read_bytes()
+
+
+def test_a_map_with_readings_is_read_by_programs_that_know_none(tmp_path):
+    """Nothing but one field, which they skip, tells such a map from one without; the version is the same."""
+    read = random_map(read=True)
+    plain = replace(read, visits=replace(read.visits, lane=None))
+    save_map(tmp_path / "read", read, PROVENANCE)
+    save_map(tmp_path / "plain", plain, PROVENANCE)
+    version, records = read_stream(tmp_path / "read", FORMAT_VERSION)
+    visits = wire.Visits.FromString(records[5])
+    assert visits.HasField("lane")
+    visits.ClearField("lane")
+    stripped = [*records[:5], visits.SerializeToString(deterministic=True)]
+    assert (version, stripped) == read_stream(tmp_path / "plain", FORMAT_VERSION)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("offset_variance_m2", 0.0, r"visits\.lane\.offset_variance_m2\[1\] is not above zero"),
+        ("end_variance_m2", np.nan, r"visits\.lane\.end_variance_m2\[1\] is not above zero"),
+        ("heading_rad", np.inf, r"visits\.lane\.heading_rad\[1\] is not finite"),
+        ("offset_m", 1e9, r"visits\.lane\.offset_m\[1\] is farther"),
+        ("end", 3, r"visits\.lane\.end\[1\] is outside 0\.\.2"),
+    ],
+)
+def test_readings_of_no_camera_are_refused(tmp_path, field, value, message):
+    read = random_map(read=True, visits=3)
+    lane = LaneReadings(*(np.ones(3, np.float32) for _ in range(8)), np.zeros(3, np.uint8))
+    wrong = getattr(lane, field).copy()
+    wrong[1] = value
+    broken = replace(read, visits=replace(read.visits, lane=replace(lane, **{field: wrong})))
+    with pytest.raises(HippodromeError, match=message):
+        save_map(tmp_path / "map", broken, {})

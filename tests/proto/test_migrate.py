@@ -39,7 +39,7 @@ def v1_messages(m, provenance):
         wire.Attractors(**{name: getattr(states, name).tobytes() for name in type(states).__slots__}),
         vertices,
         wire.Edges(**{name: getattr(edges, name).tobytes() for name in type(edges).__slots__}),
-        wire.Visits(**{name: getattr(visits, name).tobytes() for name in type(visits).__slots__}),
+        wire.Visits(**{name: getattr(visits, name).tobytes() for name in ("t_s", "vertex", "motion")}),
     ]
     if match is not None:
         arrays = {name: getattr(match, name).tobytes() for name in ("lane", "position_m", "status")}

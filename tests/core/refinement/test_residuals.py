@@ -90,7 +90,7 @@ def test_jacobians_agree_with_differences(problem):
     visits, edges, targets, state = problem
     # sigmas so wide that the robust weights hardly change
     quiet = Noise(lateral_m=50.0, lane_heading_rad=50.0, closure_factor=1e3, scale_inverse_freedom=0.0)
-    steps, roads, closing, _ = all_factors(state, visits, edges, targets, quiet, NOTHING_OPEN)
+    steps, roads, closing, *_ = all_factors(state, visits, edges, targets, quiet, NOTHING_OPEN)
     for visit in (0, 7, 20):
         by_steps = numeric(lambda s: odometry_factors(s, visits, quiet, NOTHING_OPEN), state, visit)
         np.testing.assert_allclose(by_steps[visit, :, :3], steps.source[visit, :, :3], atol=1e-4)

@@ -15,7 +15,8 @@ from hippodrome.core.navigation.placing import lane_that_is_read
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Indicator
-from hippodrome.core.types import LocalizationEstimate, LocalizationStatus, Observation
+from hippodrome.core.navigation.whereabouts import Place
+from hippodrome.core.types import FloatArray, LocalizationEstimate, LocalizationStatus, Observation
 
 LOOK_EVERY_S = 0.4  # the localizer's pose is taken in so often: its looks are as frequent
 APART_M, APART_SIGMAS, APART_RAD = 4.0, 3.5, 0.5  # the localizer is elsewhere: so far off
@@ -31,6 +32,7 @@ LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehi
 TRUSTED_SHIFT_M = 2.0  # smaller shifts are the ground's own error: borders are seen to half a metre, and always to one side
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
+FOUND_FLOOR = (0.5**2, 0.5**2, 0.02**2)  # variances that a place by the road network has at least
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 
 
@@ -55,7 +57,14 @@ class Belief:
         self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
         self._refuted_m = 0.0
 
-    def step(self, observation: Observation, estimate: LocalizationEstimate, distance_m: float, senses: Senses) -> None:
+    def step(
+        self,
+        observation: Observation,
+        estimate: LocalizationEstimate,
+        distance_m: float,
+        senses: Senses,
+        found: Place | None = None,
+    ) -> None:
         """Take an observation in.
 
         Args:
@@ -63,12 +72,15 @@ class Belief:
             estimate: what the localizer makes of it.
             distance_m: the metres driven since the observation before.
             senses: what else is made of it.
+            found: the place by the road network, where it is sure.
         """
         self._move(distance_m, observation.yaw_rate_radps * observation.dt_s)
         if self._config.exact_poses:
             self._take_over(estimate)
             return
         self._follow_localizer(estimate, distance_m, observation.dt_s)
+        if self.track is None and found is not None:
+            self._restart(found.pose, found.covariance + np.diag(FOUND_FLOOR))
         self._correct_by_lane(observation, estimate, senses)
 
     def _move(self, distance_m: float, turned_rad: float) -> None:
@@ -97,7 +109,7 @@ class Belief:
         self._vouched += int(looked and recognised and distance_m > 0.0)
         if self.track is None:
             if self._vouched >= VOUCHED_LOOKS:
-                self._restart(estimate)
+                self._restart(estimate.pose, estimate.covariance)
             return
         if self._on_map_m < BACK_ON_MAP_M:
             return
@@ -108,7 +120,7 @@ class Belief:
         elif looked and recognised:
             self._apart_looks += 1
             if self._apart_looks >= APART_LOOKS:
-                self._restart(estimate)
+                self._restart(estimate.pose, estimate.covariance)
 
     def _is_elsewhere(self, estimate: LocalizationEstimate, track: Track) -> bool:
         """Whether the localizer believes in another place than the one that is steered by."""
@@ -130,8 +142,8 @@ class Belief:
             self._refuted = None
         return self._refuted is not None
 
-    def _restart(self, estimate: LocalizationEstimate) -> None:
-        self.track, self.plan = tracks.begun(estimate.pose, estimate.covariance), None
+    def _restart(self, pose: FloatArray, covariance: FloatArray) -> None:
+        self.track, self.plan = tracks.begun(pose, covariance), None
         self.since_fix_m = 0.0
         self._apart_looks = self._vouched = 0
 

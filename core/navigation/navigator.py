@@ -21,6 +21,7 @@ from hippodrome.core.navigation import motion as motions
 from hippodrome.core.navigation.belief import Belief
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.driving import BARRED, pace
+from hippodrome.core.navigation.guidance import Guide
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, is_missed
 from hippodrome.core.navigation.placing import keeps_left, lane_of
 from hippodrome.core.navigation.searching import search_step
@@ -30,6 +31,7 @@ from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Command, DrivingState, Goal, Indicator, Lamp, Radar
 from hippodrome.core.navigation.watch import SensorHealth, is_dark, watched
+from hippodrome.core.navigation.whereabouts import Place
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, LocalizationEstimate, LocalizationStatus, Observation
 
@@ -87,6 +89,7 @@ class Navigator:
         self._side = 1.0 if keeps_left(self._planner.roads) else -1.0
         self._senses = Senses(config, self._side, self._localizer.metres_per_unit)
         self._belief = Belief(config, self._planner, self._side)
+        self._guide = Guide(config, self._planner) if config.search_network and not config.exact_poses else None
         self._health = SensorHealth()
         self._has_goal = False
         self._standing_s = self._at_goal_s = self._search_stood_s = self._searched_m = 0.0
@@ -120,10 +123,19 @@ class Navigator:
         self.estimate = self._localizer.step(observation)
         is_known = self.estimate.localized and self.estimate.status is LocalizationStatus.LOCALIZED
         distance_m = senses.step(observation, radar, self._localizer.metres_per_unit if is_known else None)
-        self._belief.step(observation, self.estimate, distance_m, senses)
+        found = self._guess(observation, distance_m)
+        self._belief.step(observation, self.estimate, distance_m, senses, found)
         command = self._decide(radar, dt_s)
         senses.motion = motions.commanded(senses.motion, command.acceleration_mps2, command.steering_rad, dt_s)
         return command
+
+    def _guess(self, observation: Observation, distance_m: float) -> Place | None:
+        """Take an observation into the hypotheses of the place: the place, where they are sure of it."""
+        if self._guide is None:
+            return None
+        turned_rad = observation.yaw_rate_radps * observation.dt_s
+        self._guide.step(distance_m, turned_rad, self._senses, self._senses.scale_sigma, self._belief.track is None)
+        return self._guide.fix
 
     def _decide(self, radar: Radar, dt_s: float) -> Command:
         """The command of the present state."""
@@ -157,8 +169,11 @@ class Navigator:
             self._belief.plan = self._planner.plan(self._belief.track.pose, self._senses.motion.speed_mps)
 
     def _searching(self, radar: Radar, dt_s: float) -> Command:
-        """On sight along the border."""
+        """Where all likely places have a lane, or else on sight along the border."""
         config, speed = self._config, self._senses.motion.speed_mps
+        guided = None if self._guide is None else self._guide.command(radar, speed)
+        if guided is not None:
+            return guided
         self._searched_m += speed * dt_s
         self._search_stood_s = self._search_stood_s + dt_s if speed < STANDING_MPS else max(self._search_stood_s - dt_s, 0.0)
         bend = math.tan(self._senses.motion.steering_rad) / config.vehicle.wheelbase_m

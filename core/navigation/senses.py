@@ -36,6 +36,11 @@ class Senses:
         self.reading: RoadReading | None = None  # of this step's frame
         self.memory = LaneMemory()
 
+    @property
+    def scale_sigma(self) -> float:
+        """Standard deviation of ln(metres per unit)."""
+        return self.motion.scale_sigma(self._expected_scale)
+
     def step(self, observation: Observation, radar: Radar, told_scale: float | None) -> float:
         """Take an observation in: the metres that were driven. ``told_scale`` is the localizer's, where it knows the place."""
         distance_m = self._move(observation, radar, told_scale)

@@ -32,7 +32,9 @@ LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehi
 TRUSTED_SHIFT_M = 2.0  # smaller shifts are the ground's own error: borders are seen to half a metre, and always to one side
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
-FOUND_FLOOR = (0.5**2, 0.5**2, 0.02**2)  # variances that a place by the road network has at least
+FOUND_EVERY_M, FOUND_REPEATS = 1.0, 2.0  # the place by the road network is taken in so often, and repeats its errors
+FOUND_SIGMAS, ELSEWHERE_M = 4.0, 10.0  # driven while that place is so far elsewhere, before it is believed more
+FOUND_FLOOR = (0.2**2, 0.2**2, 0.02**2)  # variances that a place by the road network has at least
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 
 
@@ -52,6 +54,7 @@ class Belief:
         self.plan: Plan | None = None  # given up with the pose that it was made for
         self._since_look_s = 0.0
         self._apart_looks = self._vouched = 0
+        self._since_found_m = self._elsewhere_m = 0.0
         self._misfits = self._off_road = 0
         self._on_map_m = 0.0
         self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
@@ -78,9 +81,8 @@ class Belief:
         if self._config.exact_poses:
             self._take_over(estimate)
             return
-        self._follow_localizer(estimate, distance_m, observation.dt_s)
-        if self.track is None and found is not None:
-            self._restart(found.pose, found.covariance + np.diag(FOUND_FLOOR))
+        self._follow_network(found, distance_m)
+        self._follow_localizer(estimate, distance_m, observation.dt_s, found)
         self._correct_by_lane(observation, estimate, senses)
 
     def _move(self, distance_m: float, turned_rad: float) -> None:
@@ -96,7 +98,26 @@ class Belief:
         if self.plan is not None:
             self.plan = advanced(self.plan, self.track.pose)
 
-    def _follow_localizer(self, estimate: LocalizationEstimate, distance_m: float, dt_s: float) -> None:
+    def _follow_network(self, found: Place | None, distance_m: float) -> None:
+        """Begin at the place by the road network, be corrected by it, or go over to it where it has been elsewhere for long."""
+        self._since_found_m += distance_m
+        if found is None:
+            return
+        covariance = found.covariance + np.diag(FOUND_FLOOR)
+        if self.track is None:
+            self._restart(found.pose, covariance)
+            return
+        if tracks.sigmas_apart(self.track, found.pose, covariance) > FOUND_SIGMAS:
+            self._elsewhere_m += distance_m
+            if self._elsewhere_m > ELSEWHERE_M:
+                self._restart(found.pose, covariance)
+            return
+        self._elsewhere_m = max(self._elsewhere_m - distance_m, 0.0)
+        if self._since_found_m > FOUND_EVERY_M:
+            self._since_found_m = 0.0
+            self.track = tracks.with_pose(self.track, found.pose, FOUND_REPEATS * covariance)
+
+    def _follow_localizer(self, estimate: LocalizationEstimate, distance_m: float, dt_s: float, found: Place | None) -> None:
         """Begin, correct, or give up the pose that is steered by, as the localizer says."""
         if self.track is not None and self.track.sigma_m > FORGOTTEN_M:
             self.track, self.plan = None, None
@@ -113,22 +134,22 @@ class Belief:
             return
         if self._on_map_m < BACK_ON_MAP_M:
             return
-        if not self._is_elsewhere(estimate, self.track):
+        if not self._is_elsewhere(estimate.pose, estimate.covariance, self.track):
             self._apart_looks = 0
             if looked and recognised and distance_m > 0.0:
                 self.track = tracks.with_localizer(self.track, estimate.pose, estimate.covariance)
         elif looked and recognised:
             self._apart_looks += 1
-            if self._apart_looks >= APART_LOOKS:
+            if self._apart_looks >= APART_LOOKS and found is None:  # else two stand against one
                 self._restart(estimate.pose, estimate.covariance)
 
-    def _is_elsewhere(self, estimate: LocalizationEstimate, track: Track) -> bool:
-        """Whether the localizer believes in another place than the one that is steered by."""
-        apart = estimate.pose[:2] - track.pose[:2]
+    def _is_elsewhere(self, pose: FloatArray, covariance: FloatArray, track: Track) -> bool:
+        """Whether a pose (3,) is of another place than the one that is steered by."""
+        apart = pose[:2] - track.pose[:2]
         aside_m = abs(float(math.cos(track.pose[2]) * apart[1] - math.sin(track.pose[2]) * apart[0]))
         apart_m = float(np.hypot(*apart))
-        turned = abs(math.remainder(float(estimate.pose[2] - track.pose[2]), 2.0 * math.pi))
-        sigma_m = track.sigma_m + math.sqrt(max(0.5 * float(np.trace(estimate.covariance[:2, :2])), 0.0))
+        turned = abs(math.remainder(float(pose[2] - track.pose[2]), 2.0 * math.pi))
+        sigma_m = track.sigma_m + math.sqrt(max(0.5 * float(np.trace(covariance[:2, :2])), 0.0))
         is_far = apart_m > max(APART_M, APART_SIGMAS * sigma_m) or aside_m > max(ASIDE_M, APART_SIGMAS * sigma_m)
         return is_far or turned > APART_RAD
 
@@ -144,7 +165,7 @@ class Belief:
 
     def _restart(self, pose: FloatArray, covariance: FloatArray) -> None:
         self.track, self.plan = tracks.begun(pose, covariance), None
-        self.since_fix_m = 0.0
+        self.since_fix_m = self._elsewhere_m = 0.0
         self._apart_looks = self._vouched = 0
 
     def _correct_by_lane(self, observation: Observation, estimate: LocalizationEstimate, senses: Senses) -> None:

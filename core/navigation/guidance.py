@@ -1,65 +1,72 @@
 """Driving by what all likely places have in common, before it is known which of them is the vehicle's.
 
 Where the place is still ambiguous, most of what is left of the hypotheses agrees about the next 20 m: a right-hand bend, a
-mouth in 8 m with a street to the right. The path of a plan from the likeliest place is driven as far as nine tenths of the weight have a
-lane there, too; beyond that, nothing is known. Where that is too near, the vehicle is left to the search on sight.
+mouth in 8 m with a street to the right. Of the ways that lead on from likely places the one is driven along which nine tenths of
+the weight have a lane for longest, and as far as they have; beyond that, nothing is known. Once a place is likelier than all
+others together, it is the way to the goal from there. Where nothing is agreed on, the vehicle is left to the search on sight.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from hippodrome.core import se2
+from hippodrome.core.navigation.agreement import WAY_STEP_M, LaneField, agreed_m, lane_field
 from hippodrome.core.navigation.config import NavigatorConfig
-from hippodrome.core.navigation.course import path_poses
+from hippodrome.core.navigation.course import Course, make_course, path_poses, place_on
 from hippodrome.core.navigation.driving import pace
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
+from hippodrome.core.navigation.placing import lane_of
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2, stopping_mps
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
 from hippodrome.core.navigation.types import Command, DrivingState, Radar
+from hippodrome.core.navigation.ways import way_poses, ways_ahead
 from hippodrome.core.navigation.whereabouts import Place, Whereabouts
-from hippodrome.core.roads.geometry import RoadGeometry, project
+from hippodrome.core.roads.paths import Piece
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray
 
-SAMPLES: Final = 48  # poses that stand for all hypotheses
-LOOK_M: Final = 26.0  # of the path
-AGREED: Final = 0.9  # share of the poses that have a lane where the path is
-BESIDE_M, ASKEW_RAD = 1.1, 0.5  # so near to it, and of its direction
-LEAST_M: Final = 7.0  # of the path that is agreed on
-SPARE_M: Final = 4.0  # of it that is left over when the vehicle stops at its end
-LEAST_SHARE: Final = 0.04  # of the likeliest place, for a plan to be made from it
-RIVAL: Final = 0.25  # the place that is followed is given up where another has so many times its weight: 4
+SAMPLES: Final = 64  # poses that stand for all hypotheses ..
+TRIED: Final = 8  # .. and those whose ways ahead are tried
+LOOK_M: Final = 26.0  # of a way
+WAY_M: Final = 45.0  # of a way that is driven: another one is looked for before its end
+AGREED: Final = 0.9  # share of the poses that have a lane where the way is
+LEAST_M, SPARE_M = 5.0, 2.5  # of a way that is agreed on; and what is left over of it when the vehicle stops
+LIKELY: Final = 0.5  # share of a place from which the way to the goal is driven
+RIVAL: Final = 0.25  # the place that is followed is given up where another has four times its weight
 PULL: Final = 0.5  # by which the pose is taken to the particles' mean each time
-TRY_EVERY_M: Final = 3.0  # a plan costs milliseconds
+TRY_EVERY_M: Final = 2.0  # trying ways costs milliseconds
 NEAR_GOAL_M: Final = 25.0  # whoever is not sure of the place does not stop at the goal
-AHEAD_M, HALF_BODY_M = (4.0, 12.0), 0.6  # of the path, which must not lead off the road
+AHEAD_M, HALF_BODY_M = (4.0, 12.0), 0.6  # of the way, which must not lead off the road
 OFF_ROAD, OFF_ROAD_LOOKS = 0.3, 2
-REASON: Final = "drives where all likely places have a lane"
 FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 12.0  # a place so sure, for so long, is a fix
 GUIDED_MPS: Final = 6.0
+REASON: Final = "drives where all likely places have a lane"
 
 
 class Guide:
-    """The hypotheses, the place that is followed among them, and the plan from it.
+    """The hypotheses, the place that is followed among them, and the way on from it.
 
     Args:
         config: all parameters.
-        planner: makes the plans.
+        planner: knows the roads, and makes plans.
     """
 
     def __init__(self, config: NavigatorConfig, planner: RoutePlanner) -> None:
         self._config, self._planner = config, planner
+        self._field: LaneField = lane_field(planner.roads.network)
         self.whereabouts = Whereabouts(planner.roads)
         self.plan: Plan | None = None
-        self.pose: FloatArray | None = None
-        self.place: Place | None = None  # the likeliest, when it was last looked for
+        self.pose: FloatArray | None = None  # in the place that is followed
+        self.place: Place | None = None  # the likeliest, moved on since it was last looked for
         self.agreed_m = 0.0
-        self._since_look_m = self._since_try_m = self._sure_m = 0.0
+        self._to_goal = False
+        self._since_look_m, self._since_try_m, self._sure_m = 0.0, TRY_EVERY_M, 0.0
         self._off_road = 0
 
     @property
@@ -67,15 +74,13 @@ class Guide:
         """The place, where it is sure."""
         return self.place if self._sure_m >= FIX_M else None
 
-    def step(self, distance_m: float, turned_rad: float, senses: Senses, scale_sigma: float, searches: bool) -> None:
+    def step(self, distance_m: float, turned_rad: float, senses: Senses, searches: bool) -> None:
         """Take a step in; only where the vehicle ``searches`` a way is looked for."""
-        self.whereabouts.step(distance_m, turned_rad, senses, scale_sigma)
+        self.whereabouts.step(distance_m, turned_rad, senses, senses.scale_sigma)
         if self.pose is not None:
-            chord = self.pose[2] + 0.5 * turned_rad
-            step = np.array([distance_m * math.cos(chord), distance_m * math.sin(chord), turned_rad])
-            self.pose = self.pose + step
+            self.pose = moved(self.pose, distance_m, turned_rad)
         if self.place is not None:
-            self.place = self.place.moved(distance_m, turned_rad)
+            self.place = self.place.at(moved(self.place.pose, distance_m, turned_rad))
         self._since_look_m += abs(distance_m)
         self._since_try_m += abs(distance_m)
         if self._since_look_m >= 1.0:
@@ -89,6 +94,7 @@ class Guide:
                 self.plan = None
 
     def _look(self, senses: Senses, searches: bool) -> None:
+        """Look for the likeliest place, and for what can be driven from there."""
         where = self.whereabouts
         self.place = best = where.best()
         is_sure = best.share > FIX_SHARE and best.sigma_m < FIX_SIGMA_M and where.fits > FIX_FITS
@@ -96,54 +102,107 @@ class Guide:
         self.agreed_m = 0.0
         if not searches:
             return
-        if self.pose is not None:
-            mine = where.near(self.pose)
-            if mine.share < RIVAL * best.share:
-                self.plan = self.pose = None
-            else:
-                self.pose = self.pose + PULL * se2_difference(mine.pose, self.pose)
-        if self.plan is None:
-            self._try(best)
-        if self.plan is None or self.pose is None:
-            return
-        self._check_by_sight(senses)
+        self._follow(best)
+        poses = where.sample(SAMPLES)
         if self.plan is not None:
-            ahead = path_poses(self.plan.course, self.plan.u_m, self.plan.u_m + LOOK_M)[::3]
-            self.agreed_m = agreed_m(self._planner.roads, se2.between(self.pose, ahead), where.sample(SAMPLES))
+            self._keep(senses, poses)
+        ends = self.plan is not None and self.plan.course.last_u_m - self.plan.u_m < LOOK_M
+        wants_goal = best.share > LIKELY and not self._to_goal
+        if (self.agreed_m < LEAST_M or ends or wants_goal) and self._since_try_m >= TRY_EVERY_M:
+            self._since_try_m = 0.0
+            self._try(best, poses, senses)
 
-    def _try(self, best: Place) -> None:
-        """Plan from the likeliest place."""
-        if best.share < LEAST_SHARE or self._since_try_m < TRY_EVERY_M:
+    def _follow(self, best: Place) -> None:
+        """Take the pose to the particles about it, or give it up for a place that is much likelier."""
+        if self.pose is None:
             return
-        self._since_try_m = 0.0
-        self.pose = best.pose if self.pose is None else self.pose
-        self.plan = self._planner.plan(self.pose, 0.0)
-        if self.plan is not None and 0.0 < self.plan.to_goal_m < NEAR_GOAL_M:
-            self.plan = self._planner.plan(self.pose, 0.0, beyond_goal=True)
-        if self.plan is None:
-            self.pose = None
-
-    def _check_by_sight(self, senses: Senses) -> None:
-        """Give up a plan whose path leads where no road is seen, and the place with it."""
-        assert self.plan is not None and self.pose is not None
-        ahead = se2.between(self.pose, path_poses(self.plan.course, self.plan.u_m + AHEAD_M[0], self.plan.u_m + AHEAD_M[1]))
-        left = np.stack([-np.sin(ahead[:, 2]), np.cos(ahead[:, 2])], axis=1)
-        points = np.concatenate([ahead[:, :2] + aside * left for aside in (-HALF_BODY_M, 0.0, HALF_BODY_M)])
-        self._off_road = self._off_road + 1 if senses.ground.off_road_share(points) > OFF_ROAD else 0
-        if self._off_road >= OFF_ROAD_LOOKS:
+        mine = self.whereabouts.near(self.pose)
+        if mine.share < RIVAL * best.share:
             self.plan = self.pose = None
-            self._off_road = 0
-            self._since_try_m = -TRY_EVERY_M
+            return
+        off = mine.pose - self.pose
+        off[2] = wrap(off[2])
+        self.pose = self.pose + PULL * off
+
+    def _keep(self, senses: Senses, poses: FloatArray) -> None:
+        """See how far the present way is agreed on; give it up where it leads off the road."""
+        assert self.plan is not None and self.pose is not None
+        course = self.plan.course
+        ahead = se2.between(self.pose, path_poses(course, self.plan.u_m, self.plan.u_m + LOOK_M)[::4])
+        self.agreed_m = agreed_m(self._field.agreed(ahead[None], poses)[0], AGREED)
+        self._off_road = self._off_road + 1 if self._leads_off_road(senses, ahead) else 0
+        if self._off_road >= OFF_ROAD_LOOKS:
+            self.plan, self.agreed_m, self._off_road = None, 0.0, 0
+
+    def _leads_off_road(self, senses: Senses, ahead: FloatArray) -> bool:
+        """Whether a way (n, 3), in the vehicle's axes, is seen to lead where there is no road."""
+        near = ahead[(ahead[:, 0] > AHEAD_M[0]) & (np.hypot(ahead[:, 0], ahead[:, 1]) < AHEAD_M[1])]
+        if len(near) == 0:
+            return False
+        left = np.stack([-np.sin(near[:, 2]), np.cos(near[:, 2])], axis=1)
+        points = np.concatenate([near[:, :2] + aside * left for aside in (-HALF_BODY_M, 0.0, HALF_BODY_M)])
+        return senses.ground.off_road_share(points) > OFF_ROAD
+
+    def _try(self, best: Place, poses: FloatArray, senses: Senses) -> None:
+        """Look for a way that is agreed on for longer than the present one."""
+        if best.share > LIKELY and self._try_goal(best, poses, senses):
+            return
+        network, lengths_m = self._planner.roads.network, self._planner.roads.lane_length_m
+        starts = [best.pose, *poses[:: max(len(poses) // TRIED, 1)]]
+        grid_m = np.arange(0.0, LOOK_M + 0.1, WAY_STEP_M)
+        found: list[tuple[FloatArray, list[Piece], FloatArray, float]] = []
+        for pose in starts:
+            place = lane_of(self._planner.roads, pose)
+            if place is None:
+                continue
+            for pieces in ways_ahead(network, lengths_m, place.lane, place.position_m, LOOK_M):
+                if not pieces or pieces[0].lane != place.lane:
+                    continue
+                way = way_poses(network, pieces, grid_m, place.position_m)
+                ahead = se2.between(pose, way)
+                if len(way) > 1 and not self._leads_off_road(senses, ahead):
+                    found.append((pose, pieces, ahead, place.position_m))
+        if not found:
+            return
+        ways = np.full((len(found), len(grid_m), 3), 1e6)
+        for k, (_, _, ahead, _) in enumerate(found):
+            ways[k, : len(ahead)] = ahead
+        far_m = [agreed_m(share, AGREED) for share in self._field.agreed(ways, poses)]
+        k = int(np.argmax(far_m))
+        if far_m[k] > max(self.agreed_m, LEAST_M):
+            pose, pieces, _, position_m = found[k]
+            self._drive(pose, pieces, position_m, far_m[k])
+
+    def _try_goal(self, best: Place, poses: FloatArray, senses: Senses) -> bool:
+        """Plan from the likeliest place; whether that is agreed on."""
+        plan = self._planner.plan(best.pose, 0.0)
+        if plan is not None and plan.to_goal_m < NEAR_GOAL_M:
+            plan = self._planner.plan(best.pose, 0.0, beyond_goal=True)
+        if plan is None:
+            return False
+        ahead = se2.between(best.pose, path_poses(plan.course, plan.u_m, plan.u_m + LOOK_M)[::4])
+        far_m = agreed_m(self._field.agreed(ahead[None], poses)[0], AGREED)
+        if far_m < LEAST_M or self._leads_off_road(senses, ahead):
+            return False
+        self.plan, self.pose, self.agreed_m, self._to_goal = plan, best.pose, far_m, True
+        return True
+
+    def _drive(self, pose: FloatArray, pieces: Sequence[Piece], position_m: float, far_m: float) -> None:
+        """Take a way."""
+        network = self._planner.roads.network
+        course: Course = make_course(network, pieces, pieces[-1].lane, pieces[-1].end_m, self._config.drive, self._config.vehicle)
+        u_m = place_on(course, pose, min(position_m - pieces[0].begin_m, course.last_u_m))
+        self.plan, self.pose, self.agreed_m, self._to_goal = Plan(course, u_m), pose, far_m, False
 
     def command(self, radar: Radar, speed_mps: float) -> Command | None:
         """What to do on the way that is agreed on; None where that is too short."""
         config = self._config
-        need_m = LEAST_M + 0.5 * speed_mps**2 / config.drive.braking_mps2 * 0.5
         left_m = self.agreed_m - self._since_look_m
-        if self.plan is None or self.pose is None or left_m < need_m:
+        if self.plan is None or self.pose is None or left_m < LEAST_M - 1.0:
             return None
         step = pace(self.plan.course, self.plan.u_m, speed_mps, radar, 0.0, config.drive, config.vehicle)
-        wanted = min(step.speed_mps, GUIDED_MPS, stopping_mps(left_m - SPARE_M, config.drive.braking_mps2))
+        agreed_mps = max(stopping_mps(left_m - SPARE_M, config.drive.braking_mps2), config.drive.creep_mps)
+        wanted = min(step.speed_mps, GUIDED_MPS, agreed_mps)
         accel = min(
             approach_mps2(speed_mps, wanted, config.drive), following_mps2(speed_mps, radar, config.drive, config.vehicle)
         )
@@ -153,25 +212,9 @@ class Guide:
         return Command(accel, wheel, step.indicator, DrivingState.SEARCHING, step.reason or REASON)
 
 
-def se2_difference(a: FloatArray, b: FloatArray) -> FloatArray:
-    """The pose a less the pose b, with the angle wrapped."""
-    difference = a - b
-    difference[2] = wrap(difference[2])
-    return difference
-
-
-def agreed_m(roads: RoadGeometry, ahead: FloatArray, poses: FloatArray) -> float:
-    """How far of a way ahead (n, 3), in the vehicle's axes, ``AGREED`` of the poses (k, 3) have a lane along it."""
-    if len(ahead) < 2:
-        return 0.0
-    along_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ahead[:, :2], axis=0).T))])
-    cos, sin = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
-    x = poses[:, :1] + cos * ahead[None, :, 0] - sin * ahead[None, :, 1]
-    y = poses[:, 1:2] + sin * ahead[None, :, 0] + cos * ahead[None, :, 1]
-    heading = (poses[:, 2:] + ahead[None, :, 2]).ravel()
-    near = project(roads, np.stack([x.ravel(), y.ravel()], axis=1), BESIDE_M)
-    fits = np.zeros(len(heading), dtype=np.bool_)
-    fits[near.point[np.abs(wrap(near.heading_rad - heading[near.point])) < ASKEW_RAD]] = True
-    holds = np.logical_and.accumulate(fits.reshape(len(poses), len(ahead)), axis=1)
-    enough = np.flatnonzero(holds.mean(axis=0) >= AGREED)
-    return float(along_m[enough[-1]]) if len(enough) else 0.0
+def moved(pose: FloatArray, distance_m: float, turned_rad: float) -> FloatArray:
+    """A pose after a short arc."""
+    chord = pose[2] + 0.5 * turned_rad
+    step = np.array([distance_m * math.cos(chord), distance_m * math.sin(chord), turned_rad])
+    after: FloatArray = pose + step
+    return after

@@ -134,7 +134,7 @@ class Navigator:
         if self._guide is None:
             return None
         turned_rad = observation.yaw_rate_radps * observation.dt_s
-        self._guide.step(distance_m, turned_rad, self._senses, self._senses.scale_sigma, self._belief.track is None)
+        self._guide.step(distance_m, turned_rad, self._senses, self._belief.track is None)
         return self._guide.fix
 
     def _decide(self, radar: Radar, dt_s: float) -> Command:

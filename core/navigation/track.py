@@ -72,12 +72,25 @@ def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
 
 def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Track:
     """The track after the localizer's pose."""
-    track = _with_scale(track)
     noise = covariance + _turned(float(pose[2]), LOCALIZED_M[0] ** 2, LOCALIZED_M[1] ** 2, LOCALIZED_RAD**2)
+    return with_pose(track, pose, noise)
+
+
+def with_pose(track: Track, pose: FloatArray, noise: FloatArray) -> Track:
+    """The track after its pose was measured, with a covariance (3, 3)."""
+    track = _with_scale(track)
     difference = pose - track.pose
     difference[2] = wrap_compiled(difference[2])
     gain = np.asarray(np.linalg.solve((track.covariance + noise).T, track.covariance.T).T, dtype=np.float64)
     return _shifted(track, gain @ difference, gain, np.eye(3), noise)
+
+
+def sigmas_apart(track: Track, pose: FloatArray, covariance: FloatArray) -> float:
+    """How far a pose with its covariance is from the track's, in standard deviations of both."""
+    difference = pose - track.pose
+    difference[2] = wrap_compiled(difference[2])
+    whole = _with_scale(track).covariance + covariance
+    return math.sqrt(max(float(difference @ np.linalg.solve(whole, difference)), 0.0))
 
 
 def with_lane(track: Track, reading: RoadReading, lane_point_m: FloatArray, lane_heading_rad: float) -> tuple[Track, bool]:

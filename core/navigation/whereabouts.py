@@ -27,13 +27,14 @@ ROOM: Final = 2000  # for those that split
 PER_BIN, BIN_M = 15, 2.0  # later there are so many for each stretch of lane on which there are any
 LOOK_EVERY_M: Final = 1.0  # the ground is compared so often ..
 GROUND_PER_M: Final = 0.035  # .. and each point of it counts so much per metre: it is seen over and over again
-BLUR_M, OUTLIER = 0.35, 0.2  # of the paving's edge as it is seen; and what is seen wrongly
+EDGE_M, BLUR_M, OUTLIER = 0.2, 0.3, 0.2  # the paving's edge is seen so far inside, so blurred; and what is seen wrongly
 READ_SIGMA_M, READ_GATE_M, READ_GATE_RAD, READ_GAIN, READ_WEIGHT = 0.4, 1.2, 0.35, 0.2, 0.15
 END_SIGMA_M, END_OUTLIER, END_WEIGHT = 0.8, 0.2, 0.3
 SURE_M2: Final = 0.05  # variance of an offset in the lane that is taken in
 JITTER: Final = (0.15, 0.15, 0.006, 0.15)  # of renewed particles: m, m, rad, and standard deviations of the scale
 WIDE, WIDE_EVERY = 6.0, 10  # of every so many renewed ones one gets so much more, in case all are a little wrong
 LEAST_SCALE_SIGMA: Final = 0.06  # of ln(scale): dashes that were counted wrongly are worse than they know
+SCALE_MEMORY_M: Final = 60.0  # over which a scale is forgotten
 LOST, LOST_PER_M = 0.75, 0.15  # the ground as the likeliest place has it, averaged over some 7 m: below that all are wrong
 CLUSTER_M, CLUSTER_RAD = 5.0, 0.7  # particles so near to one another are of one place
 FORWARD_M, ASIDE_M, GRID_M = (-3.0, 13.0), 7.0, 1.0  # of the ground that is compared
@@ -61,11 +62,9 @@ class Place:
         """Standard deviation of the position, over both axes."""
         return math.sqrt(max(float(self.covariance[0, 0] + self.covariance[1, 1]), 0.0))
 
-    def moved(self, distance_m: float, turned_rad: float) -> Place:
-        """The place after a short arc."""
-        chord = self.pose[2] + 0.5 * turned_rad
-        step = np.array([distance_m * math.cos(chord), distance_m * math.sin(chord), turned_rad])
-        return replace(self, pose=self.pose + step)
+    def at(self, pose: FloatArray) -> Place:
+        """The place with another pose."""
+        return replace(self, pose=pose)
 
 
 class Whereabouts:
@@ -133,6 +132,7 @@ class Whereabouts:
         if senses.reading is not None and distance_m != 0.0:
             self._read(senses.reading)
         if self._since_look_m >= LOOK_EVERY_M:
+            self._wander(self._since_look_m)
             self._look(senses, self._since_look_m)
             self._doubt(senses, self._since_look_m)
             self._since_look_m = 0.0
@@ -153,6 +153,13 @@ class Whereabouts:
                 self._rows, self._segments, self._count, lanes, internal, self._roads.lane_length_m, end_m, sigma_m,
                 END_OUTLIER, END_WEIGHT,
             )  # fmt: skip
+
+    def _wander(self, driven_m: float) -> None:
+        """Let the scales wander, as that of the odometry does: an Ornstein-Uhlenbeck process that keeps its spread."""
+        kept = math.exp(-driven_m / SCALE_MEMORY_M)
+        scale = self._rows[: self._count, hyp.SCALE]
+        scale *= kept
+        scale += math.sqrt(1.0 - kept**2) * self._rng.standard_normal(self._count)
 
     def _look(self, senses: Senses, driven_m: float) -> None:
         """Weigh by the ground."""
@@ -266,6 +273,6 @@ def _ground_points() -> tuple[FloatArray, FloatArray]:
 def _ground_cost() -> FloatArray:
     """What it costs (2, 2 * MOST_LEVEL + 1) to see road, and to see none, at each level of the raster: -ln of its probability."""
     distance = LEVEL_M * np.arange(-MOST_LEVEL, MOST_LEVEL + 1)
-    paved = 1.0 / (1.0 + np.exp(-distance / BLUR_M))
+    paved = 1.0 / (1.0 + np.exp((EDGE_M - distance) / BLUR_M))
     road = 0.5 * OUTLIER + (1.0 - OUTLIER) * paved
     return np.stack([-np.log(road), -np.log(1.0 - road)])

@@ -85,6 +85,11 @@ class Belief:
         self._follow_localizer(estimate, distance_m, observation.dt_s, found)
         self._correct_by_lane(observation, estimate, senses)
 
+    def recognised_pose(self, estimate: LocalizationEstimate) -> FloatArray | None:
+        """The localizer's pose, where it has just recognised a view."""
+        is_recognised = estimate.confidence >= self._config.localizer.margin
+        return estimate.pose if is_recognised and estimate.status is LocalizationStatus.LOCALIZED else None
+
     def _move(self, distance_m: float, turned_rad: float) -> None:
         if self.track is not None:
             self.track = tracks.moved(self.track, distance_m, turned_rad)
@@ -115,7 +120,7 @@ class Belief:
         self._elsewhere_m = max(self._elsewhere_m - distance_m, 0.0)
         if self._since_found_m > FOUND_EVERY_M:
             self._since_found_m = 0.0
-            self.track = tracks.with_pose(self.track, found.pose, FOUND_REPEATS * covariance)
+            self.track = tracks.with_pose(tracks.humble(self.track), found.pose, FOUND_REPEATS * covariance)
 
     def _follow_localizer(self, estimate: LocalizationEstimate, distance_m: float, dt_s: float, found: Place | None) -> None:
         """Begin, correct, or give up the pose that is steered by, as the localizer says."""

@@ -35,7 +35,8 @@ SAMPLES: Final = 64  # poses that stand for all hypotheses ..
 TRIED: Final = 8  # .. and those whose ways ahead are tried
 LOOK_M: Final = 26.0  # of a way
 WAY_M: Final = 45.0  # of a way that is driven: another one is looked for before its end
-AGREED: Final = 0.9  # share of the poses that have a lane where the way is
+AGREED, GUESSED = 0.9, 0.6  # share of the poses that have a lane where the way is; with less, it is driven at a walk
+GUESSED_MPS: Final = 2.0
 LEAST_M, SPARE_M = 5.0, 2.5  # of a way that is agreed on; and what is left over of it when the vehicle stops
 LIKELY: Final = 0.5  # share of a place from which the way to the goal is driven
 RIVAL: Final = 0.25  # the place that is followed is given up where another has four times its weight
@@ -46,7 +47,7 @@ AHEAD_M, HALF_BODY_M = (4.0, 12.0), 0.6  # of the way, which must not lead off t
 OFF_ROAD, OFF_ROAD_LOOKS = 0.3, 2
 FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 12.0  # a place so sure, for so long, is a fix
 GUIDED_MPS: Final = 6.0
-REASON: Final = "drives where all likely places have a lane"
+REASON, GUESS = "drives where all likely places have a lane", "creeps where most likely places have a lane"
 
 
 class Guide:
@@ -64,7 +65,7 @@ class Guide:
         self.plan: Plan | None = None
         self.pose: FloatArray | None = None  # in the place that is followed
         self.place: Place | None = None  # the likeliest, moved on since it was last looked for
-        self.agreed_m = 0.0
+        self.agreed_m = self.guessed_m = 0.0
         self._to_goal = False
         self._since_look_m, self._since_try_m, self._sure_m = 0.0, TRY_EVERY_M, 0.0
         self._off_road = 0
@@ -74,9 +75,17 @@ class Guide:
         """The place, where it is sure."""
         return self.place if self._sure_m >= FIX_M else None
 
-    def step(self, distance_m: float, turned_rad: float, senses: Senses, searches: bool) -> None:
-        """Take a step in; only where the vehicle ``searches`` a way is looked for."""
-        self.whereabouts.step(distance_m, turned_rad, senses, senses.scale_sigma)
+    def step(self, distance_m: float, turned_rad: float, senses: Senses, told: FloatArray | None, searches: bool) -> None:
+        """Take a step in; only where the vehicle ``searches`` a way is looked for.
+
+        Args:
+            distance_m: driven.
+            turned_rad: meanwhile.
+            senses: what is sensed.
+            told: (3,) the pose by the localizer, where it recognised a view.
+            searches: whether the vehicle does.
+        """
+        self.whereabouts.step(distance_m, turned_rad, senses, senses.scale_sigma, told)
         if self.pose is not None:
             self.pose = moved(self.pose, distance_m, turned_rad)
         if self.place is not None:
@@ -99,7 +108,7 @@ class Guide:
         self.place = best = where.best()
         is_sure = best.share > FIX_SHARE and best.sigma_m < FIX_SIGMA_M and where.fits > FIX_FITS
         self._sure_m = self._sure_m + self._since_look_m if is_sure else 0.0
-        self.agreed_m = 0.0
+        self.agreed_m = self.guessed_m = 0.0
         if not searches:
             return
         self._follow(best)
@@ -129,10 +138,10 @@ class Guide:
         assert self.plan is not None and self.pose is not None
         course = self.plan.course
         ahead = se2.between(self.pose, path_poses(course, self.plan.u_m, self.plan.u_m + LOOK_M)[::4])
-        self.agreed_m = agreed_m(self._field.agreed(ahead[None], poses)[0], AGREED)
+        self.agreed_m, self.guessed_m = self._reach_m(self._field.agreed(ahead[None], poses)[0])
         self._off_road = self._off_road + 1 if self._leads_off_road(senses, ahead) else 0
         if self._off_road >= OFF_ROAD_LOOKS:
-            self.plan, self.agreed_m, self._off_road = None, 0.0, 0
+            self.plan, self.agreed_m, self.guessed_m, self._off_road = None, 0.0, 0.0, 0
 
     def _leads_off_road(self, senses: Senses, ahead: FloatArray) -> bool:
         """Whether a way (n, 3), in the vehicle's axes, is seen to lead where there is no road."""
@@ -167,11 +176,17 @@ class Guide:
         ways = np.full((len(found), len(grid_m), 3), 1e6)
         for k, (_, _, ahead, _) in enumerate(found):
             ways[k, : len(ahead)] = ahead
-        far_m = [agreed_m(share, AGREED) for share in self._field.agreed(ways, poses)]
-        k = int(np.argmax(far_m))
-        if far_m[k] > max(self.agreed_m, LEAST_M):
+        far = [self._reach_m(share) for share in self._field.agreed(ways, poses)]
+        k = max(range(len(far)), key=lambda one: (far[one][0] >= LEAST_M, sum(far[one])))
+        now = self.agreed_m >= LEAST_M, self.agreed_m + self.guessed_m
+        if far[k][1] >= LEAST_M and (far[k][0] >= LEAST_M, sum(far[k])) > now:
             pose, pieces, _, position_m = found[k]
-            self._drive(pose, pieces, position_m, far_m[k])
+            self._drive(pose, pieces, position_m, far[k])
+
+    @staticmethod
+    def _reach_m(share: FloatArray) -> tuple[float, float]:
+        """How far a way is agreed on, and how far it is a guess."""
+        return agreed_m(share, AGREED), agreed_m(share, GUESSED)
 
     def _try_goal(self, best: Place, poses: FloatArray, senses: Senses) -> bool:
         """Plan from the likeliest place; whether that is agreed on."""
@@ -181,35 +196,39 @@ class Guide:
         if plan is None:
             return False
         ahead = se2.between(best.pose, path_poses(plan.course, plan.u_m, plan.u_m + LOOK_M)[::4])
-        far_m = agreed_m(self._field.agreed(ahead[None], poses)[0], AGREED)
-        if far_m < LEAST_M or self._leads_off_road(senses, ahead):
+        far_m = self._reach_m(self._field.agreed(ahead[None], poses)[0])
+        if far_m[0] < LEAST_M or self._leads_off_road(senses, ahead):
             return False
-        self.plan, self.pose, self.agreed_m, self._to_goal = plan, best.pose, far_m, True
+        self.plan, self.pose, self._to_goal = plan, best.pose, True
+        self.agreed_m, self.guessed_m = far_m
         return True
 
-    def _drive(self, pose: FloatArray, pieces: Sequence[Piece], position_m: float, far_m: float) -> None:
+    def _drive(self, pose: FloatArray, pieces: Sequence[Piece], position_m: float, far_m: tuple[float, float]) -> None:
         """Take a way."""
         network = self._planner.roads.network
         course: Course = make_course(network, pieces, pieces[-1].lane, pieces[-1].end_m, self._config.drive, self._config.vehicle)
         u_m = place_on(course, pose, min(position_m - pieces[0].begin_m, course.last_u_m))
-        self.plan, self.pose, self.agreed_m, self._to_goal = Plan(course, u_m), pose, far_m, False
+        self.plan, self.pose, self._to_goal = Plan(course, u_m), pose, False
+        self.agreed_m, self.guessed_m = far_m
 
     def command(self, radar: Radar, speed_mps: float) -> Command | None:
         """What to do on the way that is agreed on; None where that is too short."""
         config = self._config
-        left_m = self.agreed_m - self._since_look_m
+        left_m, most_mps, reason = self.agreed_m - self._since_look_m, GUIDED_MPS, REASON
+        if left_m < LEAST_M - 1.0:
+            left_m, most_mps, reason = self.guessed_m - self._since_look_m, GUESSED_MPS, GUESS
         if self.plan is None or self.pose is None or left_m < LEAST_M - 1.0:
             return None
         step = pace(self.plan.course, self.plan.u_m, speed_mps, radar, 0.0, config.drive, config.vehicle)
         agreed_mps = max(stopping_mps(left_m - SPARE_M, config.drive.braking_mps2), config.drive.creep_mps)
-        wanted = min(step.speed_mps, GUIDED_MPS, agreed_mps)
+        wanted = min(step.speed_mps, most_mps, agreed_mps)
         accel = min(
             approach_mps2(speed_mps, wanted, config.drive), following_mps2(speed_mps, radar, config.drive, config.vehicle)
         )
         accel = min(accel, stop_mps2(speed_mps, step.to_stop_m, config.drive, config.vehicle))
         bend = path_curvature_1pm(self.plan.course, self.plan.u_m, self.pose, speed_mps, config.drive)
         wheel = steering_rad(bend, speed_mps, config.drive, config.vehicle)
-        return Command(accel, wheel, step.indicator, DrivingState.SEARCHING, step.reason or REASON)
+        return Command(accel, wheel, step.indicator, DrivingState.SEARCHING, step.reason or reason)
 
 
 def moved(pose: FloatArray, distance_m: float, turned_rad: float) -> FloatArray:

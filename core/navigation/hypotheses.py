@@ -182,6 +182,17 @@ def weigh_by_end(
 
 
 @njit(cache=True)
+def weigh_by_pose(
+    rows: FloatArray, count: int, pose: FloatArray, sigma_m: float, sigma_rad: float, outlier: float, weight: float
+) -> None:
+    """Weigh particles by a pose (3,) that is told by something that errs now and then."""
+    for i in range(count):
+        dx, dy, turn = rows[i, X] - pose[0], rows[i, Y] - pose[1], _wrap(rows[i, HEADING] - pose[2]) / sigma_rad
+        far = (dx * dx + dy * dy) / sigma_m**2 + turn * turn
+        rows[i, WEIGHT] += weight * math.log(outlier + (1.0 - outlier) * math.exp(-0.5 * min(far, 200.0)))
+
+
+@njit(cache=True)
 def resampled(rows: FloatArray, segments: IntArray, share: FloatArray, wanted: int, begin_at: float) -> IntArray:
     """Rows that systematic resampling keeps, ``wanted`` of them; ``share`` adds up to 1, ``begin_at`` lies in [0, 1)."""
     chosen = np.empty(wanted, dtype=np.int32)

@@ -134,7 +134,8 @@ class Navigator:
         if self._guide is None:
             return None
         turned_rad = observation.yaw_rate_radps * observation.dt_s
-        self._guide.step(distance_m, turned_rad, self._senses, self._belief.track is None)
+        told = None if self.estimate is None else self._belief.recognised_pose(self.estimate)
+        self._guide.step(distance_m, turned_rad, self._senses, told, self._belief.track is None)
         return self._guide.fix
 
     def _decide(self, radar: Radar, dt_s: float) -> Command:

@@ -30,6 +30,7 @@ GROUND_PER_M: Final = 0.035  # .. and each point of it counts so much per metre:
 EDGE_M, BLUR_M, OUTLIER = 0.2, 0.3, 0.2  # the paving's edge is seen so far inside, so blurred; and what is seen wrongly
 READ_SIGMA_M, READ_GATE_M, READ_GATE_RAD, READ_GAIN, READ_WEIGHT = 0.4, 1.2, 0.35, 0.2, 0.15
 END_SIGMA_M, END_OUTLIER, END_WEIGHT = 0.8, 0.2, 0.3
+TOLD_M, TOLD_RAD, TOLD_OUTLIER, TOLD_PER_M = 1.5, 0.3, 0.02, 0.15  # of the localizer's pose, whose errors repeat
 SURE_M2: Final = 0.05  # variance of an offset in the lane that is taken in
 JITTER: Final = (0.15, 0.15, 0.006, 0.15)  # of renewed particles: m, m, rad, and standard deviations of the scale
 WIDE, WIDE_EVERY = 6.0, 10  # of every so many renewed ones one gets so much more, in case all are a little wrong
@@ -120,8 +121,18 @@ class Whereabouts:
         """How many particles there are."""
         return self._count
 
-    def step(self, distance_m: float, turned_rad: float, senses: Senses, scale_sigma: float) -> None:
-        """Take a step of the vehicle in, and what it senses; ``scale_sigma`` is of ln(scale)."""
+    def step(
+        self, distance_m: float, turned_rad: float, senses: Senses, scale_sigma: float, told: FloatArray | None = None
+    ) -> None:
+        """Take a step of the vehicle in.
+
+        Args:
+            distance_m: driven.
+            turned_rad: meanwhile.
+            senses: what is sensed.
+            scale_sigma: standard deviation of ln(scale).
+            told: (3,) the pose by the localizer, where it recognised a view.
+        """
         if distance_m == 0.0 and turned_rad == 0.0:
             return
         self.driven_m += abs(distance_m)
@@ -133,6 +144,9 @@ class Whereabouts:
             self._read(senses.reading)
         if self._since_look_m >= LOOK_EVERY_M:
             self._wander(self._since_look_m)
+            if told is not None:
+                weight = TOLD_PER_M * self._since_look_m
+                hyp.weigh_by_pose(self._rows, self._count, told, TOLD_M, TOLD_RAD, TOLD_OUTLIER, weight)
             self._look(senses, self._since_look_m)
             self._doubt(senses, self._since_look_m)
             self._since_look_m = 0.0

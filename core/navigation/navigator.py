@@ -122,12 +122,19 @@ class Navigator:
             observation = replace(observation, frame=None)
         self.estimate = self._localizer.step(observation)
         is_known = self.estimate.localized and self.estimate.status is LocalizationStatus.LOCALIZED
-        distance_m = senses.step(observation, radar, self._localizer.metres_per_unit if is_known else None)
+        told_scale = self._localizer.metres_per_unit if is_known else self._guessed_scale()
+        distance_m = senses.step(observation, radar, told_scale)
         found = self._guess(observation, distance_m)
         self._belief.step(observation, self.estimate, distance_m, senses, found)
         command = self._decide(radar, dt_s)
         senses.motion = motions.commanded(senses.motion, command.acceleration_mps2, command.steering_rad, dt_s)
         return command
+
+    def _guessed_scale(self) -> float | None:
+        """Metres per unit of the odometry by the hypotheses, where they are sure of the place."""
+        if self._guide is None or self._guide.fix is None:
+            return None
+        return self._senses.metres_per_unit * math.exp(self._guide.whereabouts.log_scale)
 
     def _guess(self, observation: Observation, distance_m: float) -> Place | None:
         """Take an observation into the hypotheses of the place: the place, where they are sure of it."""

@@ -34,7 +34,7 @@ TOLD_M, TOLD_RAD, TOLD_OUTLIER, TOLD_PER_M = 1.5, 0.3, 0.02, 0.15  # of the loca
 SURE_M2: Final = 0.05  # variance of an offset in the lane that is taken in
 JITTER: Final = (0.15, 0.15, 0.006, 0.15)  # of renewed particles: m, m, rad, and standard deviations of the scale
 WIDE, WIDE_EVERY = 6.0, 10  # of every so many renewed ones one gets so much more, in case all are a little wrong
-LEAST_SCALE_SIGMA: Final = 0.06  # of ln(scale): dashes that were counted wrongly are worse than they know
+LEAST_SCALE_SIGMA: Final = 0.08  # of ln(scale): dashes that were counted wrongly are worse than they know
 SCALE_MEMORY_M: Final = 60.0  # over which a scale is forgotten
 LOST, LOST_PER_M = 0.75, 0.15  # the ground as the likeliest place has it, averaged over some 7 m: below that all are wrong
 CLUSTER_M, CLUSTER_RAD = 5.0, 0.7  # particles so near to one another are of one place
@@ -114,12 +114,17 @@ class Whereabouts:
         self._agreement = np.zeros(wanted + ROOM)
         self.fits = 1.0
         self._since_look_m = self.driven_m = 0.0
-        self._phase = 0
+        self._phase, self._scale_sigma = 0, LEAST_SCALE_SIGMA
 
     @property
     def count(self) -> int:
         """How many particles there are."""
         return self._count
+
+    @property
+    def log_scale(self) -> float:
+        """By how much the particles' scale differs from the one that their metres were measured with: ln of the ratio."""
+        return self._scale_sigma * float(self._shares() @ self._rows[: self._count, hyp.SCALE])
 
     def step(
         self, distance_m: float, turned_rad: float, senses: Senses, scale_sigma: float, told: FloatArray | None = None
@@ -137,9 +142,8 @@ class Whereabouts:
             return
         self.driven_m += abs(distance_m)
         self._since_look_m += abs(distance_m)
-        self._count = hyp.move(
-            self._rows, self._segments, self._count, distance_m, turned_rad, max(scale_sigma, LEAST_SCALE_SIGMA), *self._lanes
-        )
+        self._scale_sigma = max(scale_sigma, LEAST_SCALE_SIGMA)
+        self._count = hyp.move(self._rows, self._segments, self._count, distance_m, turned_rad, self._scale_sigma, *self._lanes)
         if senses.reading is not None and distance_m != 0.0:
             self._read(senses.reading)
         if self._since_look_m >= LOOK_EVERY_M:

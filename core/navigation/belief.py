@@ -15,7 +15,7 @@ from hippodrome.core.navigation.placing import lane_that_is_read
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Indicator
-from hippodrome.core.navigation.whereabouts import Place
+from hippodrome.core.navigation.whereabouts import Place, Whereabouts
 from hippodrome.core.types import FloatArray, LocalizationEstimate, LocalizationStatus, Observation
 
 LOOK_EVERY_S = 0.4  # the localizer's pose is taken in so often: its looks are as frequent
@@ -34,6 +34,7 @@ REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unl
 SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
 FOUND_EVERY_M, FOUND_REPEATS = 1.0, 2.0  # the place by the road network is taken in so often, and repeats its errors
 FOUND_SIGMAS, ELSEWHERE_M = 4.0, 10.0  # driven while that place is so far elsewhere, before it is believed more
+BACKED_SHARE = 0.7  # of the hypotheses that must be where the localizer is, before that is believed
 FOUND_FLOOR = (0.2**2, 0.2**2, 0.02**2)  # variances that a place by the road network has at least
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 
@@ -67,6 +68,7 @@ class Belief:
         distance_m: float,
         senses: Senses,
         found: Place | None = None,
+        where: Whereabouts | None = None,
     ) -> None:
         """Take an observation in.
 
@@ -76,13 +78,14 @@ class Belief:
             distance_m: the metres driven since the observation before.
             senses: what else is made of it.
             found: the place by the road network, where it is sure.
+            where: the hypotheses of it.
         """
         self._move(distance_m, observation.yaw_rate_radps * observation.dt_s)
         if self._config.exact_poses:
             self._take_over(estimate)
             return
         self._follow_network(found, distance_m)
-        self._follow_localizer(estimate, distance_m, observation.dt_s, found)
+        self._follow_localizer(estimate, distance_m, observation.dt_s, found, where)
         self._correct_by_lane(observation, estimate, senses)
 
     def recognised_pose(self, estimate: LocalizationEstimate) -> FloatArray | None:
@@ -122,7 +125,9 @@ class Belief:
             self._since_found_m = 0.0
             self.track = tracks.with_pose(tracks.humble(self.track), found.pose, FOUND_REPEATS * covariance)
 
-    def _follow_localizer(self, estimate: LocalizationEstimate, distance_m: float, dt_s: float, found: Place | None) -> None:
+    def _follow_localizer(
+        self, estimate: LocalizationEstimate, distance_m: float, dt_s: float, found: Place | None, where: Whereabouts | None
+    ) -> None:
         """Begin, correct, or give up the pose that is steered by, as the localizer says."""
         if self.track is not None and self.track.sigma_m > FORGOTTEN_M:
             self.track, self.plan = None, None
@@ -134,8 +139,7 @@ class Belief:
         self._since_look_s, looked = (self._since_look_s + dt_s, False) if self._since_look_s < LOOK_EVERY_S else (0.0, True)
         self._vouched += int(looked and recognised and distance_m > 0.0)
         if self.track is None:
-            if self._vouched >= VOUCHED_LOOKS:
-                self._restart(estimate.pose, estimate.covariance)
+            self._begin_as_told(estimate, where)
             return
         if self._on_map_m < BACK_ON_MAP_M:
             return
@@ -147,6 +151,17 @@ class Belief:
             self._apart_looks += 1
             if self._apart_looks >= APART_LOOKS and found is None:  # else two stand against one
                 self._restart(estimate.pose, estimate.covariance)
+
+    def _begin_as_told(self, estimate: LocalizationEstimate, where: Whereabouts | None) -> None:
+        """Begin where the localizer is, if it has recognised enough, and where most hypotheses are there, as they have it."""
+        if self._vouched < VOUCHED_LOOKS:
+            return
+        if where is None:
+            self._restart(estimate.pose, estimate.covariance)
+            return
+        near = where.near(estimate.pose)
+        if near.share > BACKED_SHARE:
+            self._restart(near.pose, near.covariance + np.diag(FOUND_FLOOR))
 
     def _is_elsewhere(self, pose: FloatArray, covariance: FloatArray, track: Track) -> bool:
         """Whether a pose (3,) is of another place than the one that is steered by."""

@@ -89,7 +89,7 @@ class Navigator:
         self._side = 1.0 if keeps_left(self._planner.roads) else -1.0
         self._senses = Senses(config, self._side, self._localizer.metres_per_unit)
         self._belief = Belief(config, self._planner, self._side)
-        self._guide = Guide(config, self._planner) if config.search_network and not config.exact_poses else None
+        self._guide = Guide(config, self._planner) if config.search_network and poses is None else None
         self._health = SensorHealth()
         self._has_goal = False
         self._standing_s = self._at_goal_s = self._search_stood_s = self._searched_m = 0.0
@@ -125,7 +125,8 @@ class Navigator:
         told_scale = self._localizer.metres_per_unit if is_known else self._guessed_scale()
         distance_m = senses.step(observation, radar, told_scale)
         found = self._guess(observation, distance_m)
-        self._belief.step(observation, self.estimate, distance_m, senses, found)
+        where = None if self._guide is None else self._guide.whereabouts
+        self._belief.step(observation, self.estimate, distance_m, senses, found, where)
         command = self._decide(radar, dt_s)
         senses.motion = motions.commanded(senses.motion, command.acceleration_mps2, command.steering_rad, dt_s)
         return command

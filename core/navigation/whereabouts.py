@@ -38,6 +38,7 @@ LEAST_SCALE_SIGMA: Final = 0.08  # of ln(scale): dashes that were counted wrongl
 SCALE_MEMORY_M: Final = 60.0  # over which a scale is forgotten
 LOST, LOST_PER_M = 0.75, 0.15  # the ground as the likeliest place has it, averaged over some 7 m: below that all are wrong
 CLUSTER_M, CLUSTER_RAD = 5.0, 0.7  # particles so near to one another are of one place
+LEAST_POINTS: Final = 20  # of the ground, which must be known
 FORWARD_M, ASIDE_M, GRID_M = (-3.0, 13.0), 7.0, 1.0  # of the ground that is compared
 SEED: Final = 17
 
@@ -111,7 +112,7 @@ class Whereabouts:
         rows[:, hyp.SCALE] = self._rng.standard_normal(wanted)
         rows[:, hyp.ALONG], rows[:, hyp.ASIDE], rows[:, hyp.TURN] = position, offset_m, heading_rad
         self._segments[:wanted] = _segment_at(self._roads, lane, position)
-        self._agreement = np.zeros(wanted + ROOM)
+        self._agreement = np.ones(wanted + ROOM)
         self.fits = 1.0
         self._since_look_m = self.driven_m = 0.0
         self._phase, self._scale_sigma = 0, LEAST_SCALE_SIGMA
@@ -151,8 +152,8 @@ class Whereabouts:
             if told is not None:
                 weight = TOLD_PER_M * self._since_look_m
                 hyp.weigh_by_pose(self._rows, self._count, told, TOLD_M, TOLD_RAD, TOLD_OUTLIER, weight)
-            self._look(senses, self._since_look_m)
-            self._doubt(senses, self._since_look_m)
+            if self._look(senses, self._since_look_m):
+                self._doubt(senses, self._since_look_m)
             self._since_look_m = 0.0
             self._renew()
 
@@ -179,19 +180,20 @@ class Whereabouts:
         scale *= kept
         scale += math.sqrt(1.0 - kept**2) * self._rng.standard_normal(self._count)
 
-    def _look(self, senses: Senses, driven_m: float) -> None:
-        """Weigh by the ground."""
+    def _look(self, senses: Senses, driven_m: float) -> bool:
+        """Weigh by the ground; whether there is enough of it in sight."""
         self._phase = 1 - self._phase
         points = self._grid[self._phase]
         kinds = senses.ground.kinds_at(points)
         known = (kinds == 1) | (kinds == 2)
-        if known.sum() < 20:
-            return
+        if known.sum() < LEAST_POINTS:
+            return False
         hyp.see(
             self._rows, self._count, np.ascontiguousarray(points[known]), np.ascontiguousarray(kinds[known]), 2,
             self._paving.levels, self._paving.corner_m, self._paving.cell_m, self._cost, GROUND_PER_M * driven_m,
             self._agreement,
         )  # fmt: skip
+        return True
 
     def _doubt(self, senses: Senses, driven_m: float) -> None:
         """Begin anew where not even the likeliest hypotheses have the ground as it is."""

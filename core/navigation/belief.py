@@ -143,7 +143,7 @@ class Belief:
             return
         if self._on_map_m < BACK_ON_MAP_M:
             return
-        if not self._is_elsewhere(estimate.pose, estimate.covariance, self.track):
+        if not self._is_elsewhere(estimate, self.track):
             self._apart_looks = 0
             if looked and recognised and distance_m > 0.0:
                 self.track = tracks.with_localizer(self.track, estimate.pose, estimate.covariance)
@@ -163,13 +163,13 @@ class Belief:
         if near.share > BACKED_SHARE:
             self._restart(near.pose, near.covariance + np.diag(FOUND_FLOOR))
 
-    def _is_elsewhere(self, pose: FloatArray, covariance: FloatArray, track: Track) -> bool:
-        """Whether a pose (3,) is of another place than the one that is steered by."""
-        apart = pose[:2] - track.pose[:2]
+    def _is_elsewhere(self, estimate: LocalizationEstimate, track: Track) -> bool:
+        """Whether the localizer believes in another place than the one that is steered by."""
+        apart = estimate.pose[:2] - track.pose[:2]
         aside_m = abs(float(math.cos(track.pose[2]) * apart[1] - math.sin(track.pose[2]) * apart[0]))
         apart_m = float(np.hypot(*apart))
-        turned = abs(math.remainder(float(pose[2] - track.pose[2]), 2.0 * math.pi))
-        sigma_m = track.sigma_m + math.sqrt(max(0.5 * float(np.trace(covariance[:2, :2])), 0.0))
+        turned = abs(math.remainder(float(estimate.pose[2] - track.pose[2]), 2.0 * math.pi))
+        sigma_m = track.sigma_m + math.sqrt(max(0.5 * float(np.trace(estimate.covariance[:2, :2])), 0.0))
         is_far = apart_m > max(APART_M, APART_SIGMAS * sigma_m) or aside_m > max(ASIDE_M, APART_SIGMAS * sigma_m)
         return is_far or turned > APART_RAD
 

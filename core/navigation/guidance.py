@@ -25,7 +25,7 @@ from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2, stopping_mps
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
 from hippodrome.core.navigation.types import Command, DrivingState, Radar
-from hippodrome.core.navigation.ways import way_poses, ways_ahead
+from hippodrome.core.navigation.ways import drawn_on, way_poses, ways_ahead
 from hippodrome.core.navigation.whereabouts import Place, Whereabouts
 from hippodrome.core.roads.paths import Piece
 from hippodrome.core.se2 import wrap
@@ -43,8 +43,8 @@ RIVAL: Final = 0.25  # the place that is followed is given up where another has 
 PULL: Final = 0.5  # by which the pose is taken to the particles' mean each time
 TRY_EVERY_M: Final = 2.0  # trying ways costs milliseconds
 NEAR_GOAL_M: Final = 25.0  # whoever is not sure of the place does not stop at the goal
-AHEAD_M, HALF_BODY_M = (4.0, 12.0), 0.6  # of the way, which must not lead off the road
-OFF_ROAD, OFF_ROAD_LOOKS = 0.3, 2
+AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of the way, which must not lead off the road
+OFF_ROAD, OFF_ROAD_LOOKS = 0.15, 2
 FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 12.0  # a place so sure, for so long, is a fix
 GUIDED_MPS: Final = 6.0
 REASON, GUESS = "drives where all likely places have a lane", "creeps where most likely places have a lane"
@@ -206,6 +206,7 @@ class Guide:
     def _drive(self, pose: FloatArray, pieces: Sequence[Piece], position_m: float, far_m: tuple[float, float]) -> None:
         """Take a way."""
         network = self._planner.roads.network
+        pieces = drawn_on(network, self._planner.roads.lane_length_m, pieces, WAY_M)
         course: Course = make_course(network, pieces, pieces[-1].lane, pieces[-1].end_m, self._config.drive, self._config.vehicle)
         u_m = place_on(course, pose, min(position_m - pieces[0].begin_m, course.last_u_m))
         self.plan, self.pose, self._to_goal = Plan(course, u_m), pose, False

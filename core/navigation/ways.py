@@ -15,6 +15,7 @@ from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray
 
 MOST_WAYS: Final = 12  # from one place
+MOST_PIECES: Final = 60  # of a way: a bound for networks whose lanes have no length
 BEHIND_M: Final = 6.0  # a way begins so far behind, so that its first bend is smooth
 CHORD_M: Final = 1.0  # half of the chord that a direction is taken over
 
@@ -36,6 +37,18 @@ def ways_ahead(network: RoadNetwork, lengths_m: FloatArray, lane: int, position_
             piece = Piece(one, 0.0, float(lengths_m[one]), False, 0.0)
             open_ways.append(([*pieces, piece], way_m + piece.length_m))
     return [[one for one in way if one.length_m > SHORTEST_M] for way in [*done, *(way for way, _ in open_ways)]]
+
+
+def drawn_on(network: RoadNetwork, lengths_m: FloatArray, pieces: Sequence[Piece], length_m: float) -> list[Piece]:
+    """A way with what follows straight on, until it is ``length_m`` long or the lanes end."""
+    way = list(pieces)
+    while sum(piece.length_m for piece in way) < length_m and len(way) < MOST_PIECES:
+        after = network.successors(way[-1].lane).tolist()
+        if not after:
+            break
+        lane = min(after, key=lambda one: abs(_turn_rad(network, one)))
+        way.append(Piece(lane, 0.0, float(lengths_m[lane]), False, 0.0))
+    return [piece for piece in way if piece.length_m > SHORTEST_M]
 
 
 def way_poses(network: RoadNetwork, pieces: Sequence[Piece], ahead_m: FloatArray, position_m: float) -> FloatArray:

@@ -11,7 +11,6 @@ import numpy as np
 from hippodrome.core.navigation.routes import SHORTEST_M, U_TURN_RAD
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.roads.paths import Piece, centreline
-from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray
 
 MOST_WAYS: Final = 12  # from one place
@@ -60,7 +59,8 @@ def way_poses(network: RoadNetwork, pieces: Sequence[Piece], ahead_m: FloatArray
     at_m = ahead_m + position_m - pieces[0].begin_m
 
     def place(u_m: FloatArray) -> FloatArray:
-        return np.stack([np.interp(u_m, along, points[:, axis]) for axis in (0, 1)], axis=1)
+        found: FloatArray = np.stack([np.interp(u_m, along, points[:, axis]) for axis in (0, 1)], axis=1)
+        return found
 
     chord = place(np.minimum(at_m + CHORD_M, along[-1])) - place(np.minimum(at_m, along[-1] - CHORD_M) - CHORD_M)
     poses: FloatArray = np.column_stack([place(at_m), np.arctan2(chord[:, 1], chord[:, 0])])
@@ -76,4 +76,4 @@ def _points(network: RoadNetwork, piece: Piece) -> FloatArray:
 def _turn_rad(network: RoadNetwork, lane: int) -> float:
     points = network.lane_points_m(lane)
     begin, end = points[1] - points[0], points[-1] - points[-2]
-    return float(wrap(math.atan2(end[1], end[0]) - math.atan2(begin[1], begin[0])))
+    return math.remainder(math.atan2(end[1], end[0]) - math.atan2(begin[1], begin[0]), 2.0 * math.pi)

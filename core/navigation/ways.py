@@ -63,8 +63,8 @@ def way_poses(network: RoadNetwork, pieces: Sequence[Piece], ahead_m: FloatArray
         return found
 
     chord = place(np.minimum(at_m + CHORD_M, along[-1])) - place(np.minimum(at_m, along[-1] - CHORD_M) - CHORD_M)
-    poses: FloatArray = np.column_stack([place(at_m), np.arctan2(chord[:, 1], chord[:, 0])])
-    return poses[at_m <= along[-1]]
+    poses: FloatArray = np.column_stack([place(at_m), np.arctan2(chord[:, 1], chord[:, 0])])[at_m <= along[-1]]
+    return poses
 
 
 def _points(network: RoadNetwork, piece: Piece) -> FloatArray:

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from hippodrome.sim.spec import Spec
 
-RowKey = Literal["ours", "truth", "dead-reckoning", "no-reading", "paper", "kalman"]
+RowKey = Literal["ours", "truth", "dead-reckoning", "no-reading", "on-sight", "paper", "kalman"]
 POLICY = r"(exec|stream):.*\S.*|[\w.]+:[\w.]+"  # a command that is fed step by step, or a Python object
 PolicyName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$")]
 Source = Annotated[str, Field(pattern=f"^({POLICY})$")]

@@ -15,7 +15,8 @@ from hippodrome.core.navigation.placing import lane_that_is_read
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Indicator
-from hippodrome.core.types import LocalizationEstimate, LocalizationStatus, Observation
+from hippodrome.core.navigation.whereabouts import Place, Whereabouts
+from hippodrome.core.types import FloatArray, LocalizationEstimate, LocalizationStatus, Observation
 
 LOOK_EVERY_S = 0.4  # the localizer's pose is taken in so often: its looks are as frequent
 APART_M, APART_SIGMAS, APART_RAD = 4.0, 3.5, 0.5  # the localizer is elsewhere: so far off
@@ -31,6 +32,10 @@ LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehi
 TRUSTED_SHIFT_M = 2.0  # smaller shifts are the ground's own error: borders are seen to half a metre, and always to one side
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
+FOUND_EVERY_M, FOUND_REPEATS = 1.0, 2.0  # the place by the road network is taken in so often, and repeats its errors
+FOUND_SIGMAS, ELSEWHERE_M = 4.0, 10.0  # driven while that place is so far elsewhere, before it is believed more
+BACKED_SHARE = 0.7  # of the hypotheses that must be where the localizer is, before that is believed
+FOUND_FLOOR = (0.2**2, 0.2**2, 0.02**2)  # variances that a place by the road network has at least
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 
 
@@ -51,12 +56,21 @@ class Belief:
         self.turns_round = False  # across the road no lane is read, and no path lies ahead
         self._since_look_s = 0.0
         self._apart_looks = self._vouched = 0
+        self._since_found_m = self._elsewhere_m = 0.0
         self._misfits = self._off_road = 0
         self._on_map_m = 0.0
         self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
         self._refuted_m = 0.0
 
-    def step(self, observation: Observation, estimate: LocalizationEstimate, distance_m: float, senses: Senses) -> None:
+    def step(
+        self,
+        observation: Observation,
+        estimate: LocalizationEstimate,
+        distance_m: float,
+        senses: Senses,
+        found: Place | None = None,
+        where: Whereabouts | None = None,
+    ) -> None:
         """Take an observation in.
 
         Args:
@@ -64,13 +78,21 @@ class Belief:
             estimate: what the localizer makes of it.
             distance_m: the metres driven since the observation before.
             senses: what else is made of it.
+            found: the place by the road network, where it is sure.
+            where: the hypotheses of it.
         """
         self._move(distance_m, observation.yaw_rate_radps * observation.dt_s)
         if self._config.exact_poses:
             self._take_over(estimate)
             return
-        self._follow_localizer(estimate, distance_m, observation.dt_s)
+        self._follow_network(found, distance_m)
+        self._follow_localizer(estimate, distance_m, observation.dt_s, found, where)
         self._correct_by_lane(observation, estimate, senses)
+
+    def recognised_pose(self, estimate: LocalizationEstimate) -> FloatArray | None:
+        """The localizer's pose, where it has just recognised a view."""
+        is_recognised = estimate.confidence >= self._config.localizer.margin
+        return estimate.pose if is_recognised and estimate.status is LocalizationStatus.LOCALIZED else None
 
     def _move(self, distance_m: float, turned_rad: float) -> None:
         if self.track is not None:
@@ -85,7 +107,28 @@ class Belief:
         if self.plan is not None:
             self.plan = advanced(self.plan, self.track.pose)
 
-    def _follow_localizer(self, estimate: LocalizationEstimate, distance_m: float, dt_s: float) -> None:
+    def _follow_network(self, found: Place | None, distance_m: float) -> None:
+        """Begin at the place by the road network, be corrected by it, or go over to it where it has been elsewhere for long."""
+        self._since_found_m += distance_m
+        if found is None:
+            return
+        covariance = found.covariance + np.diag(FOUND_FLOOR)
+        if self.track is None:
+            self._restart(found.pose, covariance)
+            return
+        if tracks.sigmas_apart(self.track, found.pose, covariance) > FOUND_SIGMAS:
+            self._elsewhere_m += distance_m
+            if self._elsewhere_m > ELSEWHERE_M:
+                self._restart(found.pose, covariance)
+            return
+        self._elsewhere_m = max(self._elsewhere_m - distance_m, 0.0)
+        if self._since_found_m > FOUND_EVERY_M:
+            self._since_found_m = 0.0
+            self.track = tracks.with_pose(tracks.humble(self.track), found.pose, FOUND_REPEATS * covariance)
+
+    def _follow_localizer(
+        self, estimate: LocalizationEstimate, distance_m: float, dt_s: float, found: Place | None, where: Whereabouts | None
+    ) -> None:
         """Begin, correct, or give up the pose that is steered by, as the localizer says."""
         if self.track is not None and self.track.sigma_m > FORGOTTEN_M:
             self.track, self.plan = None, None
@@ -97,8 +140,7 @@ class Belief:
         self._since_look_s, looked = (self._since_look_s + dt_s, False) if self._since_look_s < LOOK_EVERY_S else (0.0, True)
         self._vouched += int(looked and recognised and distance_m > 0.0)
         if self.track is None:
-            if self._vouched >= VOUCHED_LOOKS:
-                self._restart(estimate)
+            self._begin_as_told(estimate, where)
             return
         if self._on_map_m < BACK_ON_MAP_M:
             return
@@ -108,8 +150,19 @@ class Belief:
                 self.track = tracks.with_localizer(self.track, estimate.pose, estimate.covariance)
         elif looked and recognised:
             self._apart_looks += 1
-            if self._apart_looks >= APART_LOOKS:
-                self._restart(estimate)
+            if self._apart_looks >= APART_LOOKS and found is None:  # else two stand against one
+                self._restart(estimate.pose, estimate.covariance)
+
+    def _begin_as_told(self, estimate: LocalizationEstimate, where: Whereabouts | None) -> None:
+        """Begin where the localizer is, if it has recognised enough, and where most hypotheses are there, as they have it."""
+        if self._vouched < VOUCHED_LOOKS:
+            return
+        if where is None:
+            self._restart(estimate.pose, estimate.covariance)
+            return
+        near = where.near(estimate.pose)
+        if near.share > BACKED_SHARE:
+            self._restart(near.pose, near.covariance + np.diag(FOUND_FLOOR))
 
     def _is_elsewhere(self, estimate: LocalizationEstimate, track: Track) -> bool:
         """Whether the localizer believes in another place than the one that is steered by."""
@@ -131,9 +184,9 @@ class Belief:
             self._refuted = None
         return self._refuted is not None
 
-    def _restart(self, estimate: LocalizationEstimate) -> None:
-        self.track, self.plan = tracks.begun(estimate.pose, estimate.covariance), None
-        self.since_fix_m = 0.0
+    def _restart(self, pose: FloatArray, covariance: FloatArray) -> None:
+        self.track, self.plan = tracks.begun(pose, covariance), None
+        self.since_fix_m = self._elsewhere_m = 0.0
         self._apart_looks = self._vouched = 0
 
     def _correct_by_lane(self, observation: Observation, estimate: LocalizationEstimate, senses: Senses) -> None:

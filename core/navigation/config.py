@@ -93,3 +93,4 @@ class NavigatorConfig:
     watch: WatchConfig = field(default_factory=WatchConfig)
     exact_poses: bool = False  # for upper bounds: what tells the pose is taken at its word, and nothing else corrects it
     read_road: bool = True  # whether the lane is read from the frames; False: only the localizer's pose counts
+    search_network: bool = True  # whether hypotheses on the road network guide the search and find the place; False: sight alone

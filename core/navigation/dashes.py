@@ -18,6 +18,7 @@ from hippodrome.core.types import FloatArray, Frame
 from hippodrome.core.views.config import CameraGeometry
 
 NEAR_M, FAR_M, STEP_M = 3.7, 12.5, 0.1  # ahead of the rear axle; beyond it a pixel spans more than a metre
+LEAST_DEPTH_M = 1.0  # nearer than that the camera sees no ground
 ASIDE_M = np.linspace(-0.3, 0.3, 7)  # about where the line is expected
 PAINT_M = ReaderConfig().paint_m  # height of the paint above the ground that the camera's height is measured from
 LINE_M = 1.6  # from the middle of a lane to the line
@@ -43,9 +44,13 @@ def line_levels(
     """Brightest level (n,) about the line at each distance ahead; offset, heading and curvature as in ``RoadReading``."""
     height, width = frame.shape[:2]
     focal = camera.focal_px(width)
-    ahead = np.arange(NEAR_M, FAR_M, STEP_M)
-    middle = -offset_m - heading_rad * ahead + 0.5 * curvature_1pm * ahead**2 + line_side * LINE_M
-    depth = ahead - camera.forward_m
+    along = np.arange(NEAR_M, FAR_M, STEP_M)  # the middle of the lane: the line itself is longer or shorter in a bend
+    turned = curvature_1pm * along
+    east = along * np.sinc(turned / np.pi) - line_side * LINE_M * np.sin(turned)
+    north = along * np.sinc(turned / (2.0 * np.pi)) * np.sin(0.5 * turned) + line_side * LINE_M * np.cos(turned) - offset_m
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    ahead, middle = cos * east + sin * north, cos * north - sin * east
+    depth = np.maximum(ahead - camera.forward_m, LEAST_DEPTH_M)
     row = np.clip(np.rint(0.5 * (height - 1) + focal * (camera.height_m - PAINT_M) / depth), 0, height - 1).astype(np.int64)
     aside = middle[:, None] + ASIDE_M[None, :]
     column = np.clip(np.rint(0.5 * (width - 1) - focal * aside / depth[:, None]), 0, width - 1).astype(np.int64)

@@ -54,6 +54,13 @@ class Motion:
         weight = 1.0 / sigma**2
         return math.exp((weight * mean + trust * math.log(self.seen_m / self.seen_units)) / (weight + trust))
 
+    def scale_sigma(self, expected: float) -> float:
+        """Standard deviation of ln(scale), with all that is known of it."""
+        _, sigma = self.scale_without_dashes(expected)
+        if not self.dashes_fit(expected):
+            return sigma
+        return 1.0 / math.sqrt(1.0 / sigma**2 + min(self.seen_m / VISUAL_M, 1.0) ** 2 / VISUAL_SIGMA**2)
+
     def dashes_fit(self, expected: float) -> bool:
         """Whether dashes told something that the rest does not contradict: one dash is easily taken for the next."""
         if self.seen_m <= LEAST_SEEN_M or self.seen_units <= 0.0:

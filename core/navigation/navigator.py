@@ -22,6 +22,7 @@ from hippodrome.core.navigation.belief import Belief
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.driving import BARRED, pace
 from hippodrome.core.navigation.escape import Escape
+from hippodrome.core.navigation.guidance import Guide
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, is_missed
 from hippodrome.core.navigation.placing import keeps_left, lane_of
 from hippodrome.core.navigation.searching import search_step
@@ -31,6 +32,7 @@ from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Command, DrivingState, Goal, Indicator, Lamp, Radar
 from hippodrome.core.navigation.watch import SensorHealth, is_dark, watched
+from hippodrome.core.navigation.whereabouts import Place
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, LocalizationEstimate, LocalizationStatus, Observation
 
@@ -91,6 +93,7 @@ class Navigator:
         self._senses = Senses(config, self._side, self._localizer.metres_per_unit)
         self._belief = Belief(config, self._planner, self._side)
         self._escape = Escape(config, self._senses, self._belief, self._planner, self._side)
+        self._guide = Guide(config, self._planner) if config.search_network and poses is None else None
         self._health = SensorHealth()
         self._has_goal = False
         self._standing_s = self._at_goal_s = self._search_stood_s = self._searched_m = 0.0
@@ -123,13 +126,31 @@ class Navigator:
             observation = replace(observation, frame=None)
         self.estimate = self._localizer.step(observation)
         is_known = self.estimate.localized and self.estimate.status is LocalizationStatus.LOCALIZED
-        distance_m = senses.step(observation, radar, self._localizer.metres_per_unit if is_known else None)
-        self._belief.step(observation, self.estimate, distance_m, senses)
+        told_scale = self._localizer.metres_per_unit if is_known else self._guessed_scale()
+        distance_m = senses.step(observation, radar, told_scale)
+        found = self._guess(observation, distance_m)
+        where = None if self._guide is None else self._guide.whereabouts
+        self._belief.step(observation, self.estimate, distance_m, senses, found, where)
         self._escape.moved(distance_m, observation.yaw_rate_radps * dt_s)
         command = self._decide(radar, dt_s)
         accel, wheel, reverse = command.acceleration_mps2, command.steering_rad, command.reverse
         senses.motion = motions.commanded(senses.motion, accel, wheel, dt_s, reverse)
         return command
+
+    def _guessed_scale(self) -> float | None:
+        """Metres per unit of the odometry by the hypotheses, where they are sure of the place."""
+        if self._guide is None or self._guide.fix is None:
+            return None
+        return self._senses.metres_per_unit * math.exp(self._guide.whereabouts.log_scale)
+
+    def _guess(self, observation: Observation, distance_m: float) -> Place | None:
+        """Take an observation into the hypotheses of the place: the place, where they are sure of it."""
+        if self._guide is None:
+            return None
+        turned_rad = observation.yaw_rate_radps * observation.dt_s
+        told = None if self.estimate is None else self._belief.recognised_pose(self.estimate)
+        self._guide.step(distance_m, turned_rad, self._senses, told, self._belief.track is None)
+        return self._guide.fix
 
     def _decide(self, radar: Radar, dt_s: float) -> Command:
         """The command of the present state."""
@@ -167,8 +188,11 @@ class Navigator:
             self._belief.plan = self._planner.plan(self._belief.track.pose, self._senses.motion.speed_mps)
 
     def _searching(self, radar: Radar, dt_s: float) -> Command:
-        """On sight along the border."""
+        """Where all likely places have a lane, or else on sight along the border."""
         config, speed = self._config, self._senses.motion.speed_mps
+        guided = None if self._guide is None else self._guide.command(radar, speed)
+        if guided is not None:
+            return guided
         self._searched_m += speed * dt_s
         self._search_stood_s = self._search_stood_s + dt_s if speed < STANDING_MPS else max(self._search_stood_s - dt_s, 0.0)
         bend = math.tan(self._senses.motion.steering_rad) / config.vehicle.wheelbase_m

@@ -16,6 +16,8 @@ from hippodrome.core.reading.reader import RoadReader
 from hippodrome.core.reading.types import RoadReading
 from hippodrome.core.types import Observation
 
+SHARPEST_1PM = 0.02  # in sharper bends the line of dashes is not where the lane that was read has it
+
 
 class Senses:
     """What the vehicle knows without a map.
@@ -35,6 +37,16 @@ class Senses:
         self.motion = motions.Motion()
         self.reading: RoadReading | None = None  # of this step's frame
         self.memory = LaneMemory()
+
+    @property
+    def metres_per_unit(self) -> float:
+        """The scale of the odometry."""
+        return self.motion.metres_per_unit(self._expected_scale)
+
+    @property
+    def scale_sigma(self) -> float:
+        """Standard deviation of ln(metres per unit)."""
+        return self.motion.scale_sigma(self._expected_scale)
 
     def step(self, observation: Observation, radar: Radar, told_scale: float | None) -> float:
         """Take an observation in: the metres that were driven. ``told_scale`` is the localizer's, where it knows the place."""
@@ -76,6 +88,9 @@ class Senses:
             self._line = LineView(self._line.levels, self._line.units + units)
         memory = self.memory
         if observation.frame is None or not memory.is_fresh:
+            return
+        if abs(memory.curvature_1pm) > SHARPEST_1PM:
+            self._line = None
             return
         levels = line_levels(
             observation.frame, self._config.camera, memory.offset_m, memory.heading_rad, memory.curvature_1pm, -self._side

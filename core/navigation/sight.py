@@ -226,15 +226,21 @@ class Ground:
 
     def off_road_share(self, points_m: FloatArray) -> float:
         """Which share of points (n, 2) in the vehicle's axes is known to be no road, of those that are known."""
+        kind = self.kinds_at(points_m)
+        known = kind != UNKNOWN
+        return float(np.mean(kind[known] == OTHER)) if known.any() else 0.0
+
+    def kinds_at(self, points_m: FloatArray) -> UInt8Array:
+        """What the ground is (n,) at points (n, 2) in the vehicle's axes: ``UNKNOWN``, ``ROAD``, ``OTHER`` or ``PAINT``."""
         cos, sin = math.cos(self.pose[2]), math.sin(self.pose[2])
         x = self.pose[0] + cos * points_m[:, 0] - sin * points_m[:, 1]
         y = self.pose[1] + sin * points_m[:, 0] + cos * points_m[:, 1]
         i = np.floor((x - self._origin_m[0]) / CELL_M).astype(np.int64)
         j = np.floor((y - self._origin_m[1]) / CELL_M).astype(np.int64)
         inside = (i >= 0) & (j >= 0) & (i < CELLS) & (j < CELLS)
-        kind = self._cells[i[inside], j[inside]]
-        known = kind != UNKNOWN
-        return float(np.mean(kind[known] == OTHER)) if known.any() else 0.0
+        kind = np.full(len(points_m), UNKNOWN, dtype=np.uint8)
+        kind[inside] = self._cells[i[inside], j[inside]]
+        return kind
 
 
 def _hidden(kind: UInt8Array) -> NDArray[np.bool_]:

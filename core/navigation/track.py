@@ -27,6 +27,7 @@ LOCALIZED_M, LOCALIZED_RAD = (
 LANE_FLOOR_M, LANE_FLOOR_RAD = 0.08, 0.02  # a lane read from a frame is not better than that
 END_FLOOR_M = {LaneEnd.STOP_LINE: 0.4, LaneEnd.MOUTH: 0.4}  # nor where a stop line or a mouth lies
 STOP_LINE_BEFORE_END_M = 0.9  # the near edge of a stop line, before the end of the lane
+HUMBLE_M = 0.25  # each metre that the place by the road network is heard
 LOOSE_M, LOOSE_RAD = 1.0, 0.1  # how wrong a pose may be that the lanes contradict
 GATE = 9.0  # squared standard deviations that a measurement of the lane may be off
 END_GATE_M = 4.0  # and metres that an end of the lane may be off: there is another junction beyond
@@ -72,12 +73,30 @@ def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
 
 def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Track:
     """The track after the localizer's pose."""
-    track = _with_scale(track)
     noise = covariance + _turned(float(pose[2]), LOCALIZED_M[0] ** 2, LOCALIZED_M[1] ** 2, LOCALIZED_RAD**2)
+    return with_pose(track, pose, noise)
+
+
+def with_pose(track: Track, pose: FloatArray, noise: FloatArray) -> Track:
+    """The track after its pose was measured, with a covariance (3, 3)."""
+    track = _with_scale(track)
     difference = pose - track.pose
     difference[2] = wrap_compiled(difference[2])
     gain = np.asarray(np.linalg.solve((track.covariance + noise).T, track.covariance.T).T, dtype=np.float64)
     return _shifted(track, gain @ difference, gain, np.eye(3), noise)
+
+
+def humble(track: Track) -> Track:
+    """The track before it hears of another estimate with errors of its own: less sure of itself than it has become."""
+    return replace(track, covariance=track.covariance + np.diag([HUMBLE_M**2, HUMBLE_M**2, 0.0]))
+
+
+def sigmas_apart(track: Track, pose: FloatArray, covariance: FloatArray) -> float:
+    """How far a pose with its covariance is from the track's, in standard deviations of both."""
+    difference = pose - track.pose
+    difference[2] = wrap_compiled(difference[2])
+    whole = _with_scale(track).covariance + covariance
+    return math.sqrt(max(float(difference @ np.linalg.solve(whole, difference)), 0.0))
 
 
 def with_lane(track: Track, reading: RoadReading, lane_point_m: FloatArray, lane_heading_rad: float) -> tuple[Track, bool]:

@@ -15,7 +15,7 @@ from hippodrome.eval.commands.arguments import (
     positive,
 )
 
-ROW_KEYS = ("ours", "truth", "dead-reckoning", "no-reading", "paper", "kalman")
+ROW_KEYS = ("ours", "truth", "dead-reckoning", "no-reading", "on-sight", "paper", "kalman")
 
 
 def add_mission_command(commands: Any) -> None:
@@ -49,8 +49,8 @@ def add_mission_command(commands: Any) -> None:
         "--rows", nargs="*", choices=ROW_KEYS, metavar="ROW",
         help="who drives. ours: from an unknown start; truth: the same, told its true pose (the upper bound); dead-reckoning: "
              "told the true start, and nothing later (the lower bound); no-reading: without the lane read from the frames; "
-             "paper, kalman: with these modes of the localizer (default: the scenario's missions.rows, or ours truth; "
-             "without a ROW: policies alone)",
+              "on-sight: searching by what is seen alone, without the road network; paper, kalman: with these modes of the "
+              "localizer (default: the scenario's missions.rows, or ours truth; without a ROW: policies alone)",
     )  # fmt: skip
     parser.add_argument(
         "--policy", type=_policy, action="append", default=[], metavar="[NAME=]POLICY",

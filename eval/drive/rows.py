@@ -30,6 +30,7 @@ class RowSpec:
     pose: Literal["localizer", "truth", "dead reckoning"] = "localizer"
     mode: Literal["coupled", "paper", "kalman", "lanes"] | None = None  # of the localizer; None: the scenario's own
     read_road: bool = True
+    search_network: bool = True
     policy: Policy | None = None  # of somebody else, in place of the navigator
 
     @property
@@ -47,6 +48,7 @@ ROWS: Final = (
     RowSpec("truth", "ours, pose from truth", pose="truth"),
     RowSpec("dead-reckoning", "ours, dead reckoning from the true start", pose="dead reckoning"),
     RowSpec("no-reading", "ours, without road reading", read_road=False),
+    RowSpec("on-sight", "ours, searching on sight alone", search_network=False),
     RowSpec("paper", "ours, localizer mode paper", mode="paper"),
     RowSpec("kalman", "ours, localizer mode kalman", mode="kalman"),
 )
@@ -74,7 +76,13 @@ def navigator_config(scenario: Scenario, row: RowSpec) -> NavigatorConfig:
     localizer = replace(scenario.localizer, road_reading=False)  # the navigator reads the road itself
     localizer = localizer if row.mode is None else replace(localizer, mode=row.mode)
     geometry = CameraGeometry(fov_deg=camera.fov_deg, height_m=camera.height_m, forward_m=camera.forward_m)
-    return NavigatorConfig(localizer=localizer, camera=geometry, read_road=row.read_road, exact_poses=row.pose == "truth")
+    return NavigatorConfig(
+        localizer=localizer,
+        camera=geometry,
+        read_road=row.read_road,
+        exact_poses=row.pose == "truth",
+        search_network=row.search_network,
+    )
 
 
 class KnownPose(PoseSource):

@@ -1,0 +1,240 @@
+"""Driving by what all likely places have in common, before it is known which of them is the vehicle's.
+
+Where the place is still ambiguous, most of what is left of the hypotheses agrees about the next 20 m: a right-hand bend, a
+mouth in 8 m with a street to the right. Of the ways that lead on from likely places the one is driven along which nine tenths of
+the weight have a lane for longest, and as far as they have; beyond that, nothing is known. Once a place is likelier than all
+others together, it is the way to the goal from there. Where nothing is agreed on, the vehicle is left to the search on sight.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from hippodrome.core import se2
+from hippodrome.core.navigation.agreement import WAY_STEP_M, LaneField, agreed_m, lane_field
+from hippodrome.core.navigation.config import NavigatorConfig
+from hippodrome.core.navigation.course import Course, make_course, path_poses, place_on
+from hippodrome.core.navigation.driving import pace
+from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
+from hippodrome.core.navigation.placing import lane_of
+from hippodrome.core.navigation.senses import Senses
+from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2, stopping_mps
+from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
+from hippodrome.core.navigation.types import Command, DrivingState, Radar
+from hippodrome.core.navigation.ways import drawn_on, way_poses, ways_ahead
+from hippodrome.core.navigation.whereabouts import Place, Whereabouts
+from hippodrome.core.roads.paths import Piece
+from hippodrome.core.se2 import wrap
+from hippodrome.core.types import FloatArray
+
+SAMPLES: Final = 64  # poses that stand for all hypotheses ..
+TRIED: Final = 8  # .. and those whose ways ahead are tried
+LOOK_M: Final = 26.0  # of a way
+WAY_M: Final = 45.0  # of a way that is driven: another one is looked for before its end
+AGREED, GUESSED = 0.9, 0.6  # share of the poses that have a lane where the way is; with less, it is driven at a walk
+GUESSED_MPS: Final = 2.0
+LEAST_M, SPARE_M = 5.0, 2.5  # of a way that is agreed on; and what is left over of it when the vehicle stops
+LIKELY: Final = 0.5  # share of a place from which the way to the goal is driven
+RIVAL: Final = 0.25  # the place that is followed is given up where another has four times its weight
+PULL: Final = 0.5  # by which the pose is taken to the particles' mean each time
+TRY_EVERY_M: Final = 2.0  # trying ways costs milliseconds
+NEAR_GOAL_M: Final = 25.0  # whoever is not sure of the place does not stop at the goal
+AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of the way, which must not lead off the road
+OFF_ROAD, OFF_ROAD_LOOKS = 0.15, 2
+FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 12.0  # a place so sure, for so long, is a fix
+GUIDED_MPS: Final = 6.0
+REASON, GUESS = "drives where all likely places have a lane", "creeps where most likely places have a lane"
+
+
+class Guide:
+    """The hypotheses, the place that is followed among them, and the way on from it.
+
+    Args:
+        config: all parameters.
+        planner: knows the roads, and makes plans.
+    """
+
+    def __init__(self, config: NavigatorConfig, planner: RoutePlanner) -> None:
+        self._config, self._planner = config, planner
+        self._field: LaneField = lane_field(planner.roads.network)
+        self.whereabouts = Whereabouts(planner.roads)
+        self.plan: Plan | None = None
+        self.pose: FloatArray | None = None  # in the place that is followed
+        self.place: Place | None = None  # the likeliest, moved on since it was last looked for
+        self.agreed_m = self.guessed_m = 0.0
+        self._to_goal = False
+        self._since_look_m, self._since_try_m, self._sure_m = 0.0, TRY_EVERY_M, 0.0
+        self._off_road = 0
+
+    @property
+    def fix(self) -> Place | None:
+        """The place, where it is sure."""
+        return self.place if self._sure_m >= FIX_M else None
+
+    def step(self, distance_m: float, turned_rad: float, senses: Senses, told: FloatArray | None, searches: bool) -> None:
+        """Take a step in; only where the vehicle ``searches`` a way is looked for.
+
+        Args:
+            distance_m: driven.
+            turned_rad: meanwhile.
+            senses: what is sensed.
+            told: (3,) the pose by the localizer, where it recognised a view.
+            searches: whether the vehicle does.
+        """
+        self.whereabouts.step(distance_m, turned_rad, senses, senses.scale_sigma, told)
+        if self.pose is not None:
+            self.pose = moved(self.pose, distance_m, turned_rad)
+        if self.place is not None:
+            self.place = self.place.at(moved(self.place.pose, distance_m, turned_rad))
+        self._since_look_m += abs(distance_m)
+        self._since_try_m += abs(distance_m)
+        if self._since_look_m >= 1.0:
+            self._look(senses, searches)
+            self._since_look_m = 0.0
+        if not searches:
+            self.plan = self.pose = None
+        elif self.plan is not None and self.pose is not None:
+            self.plan = advanced(self.plan, self.pose)
+            if is_missed(self.plan, self.pose):
+                self.plan = None
+
+    def _look(self, senses: Senses, searches: bool) -> None:
+        """Look for the likeliest place, and for what can be driven from there."""
+        where = self.whereabouts
+        self.place = best = where.best()
+        is_sure = best.share > FIX_SHARE and best.sigma_m < FIX_SIGMA_M and where.fits > FIX_FITS
+        self._sure_m = self._sure_m + self._since_look_m if is_sure else 0.0
+        self.agreed_m = self.guessed_m = 0.0
+        if not searches:
+            return
+        self._follow(best)
+        poses = where.sample(SAMPLES)
+        if self.plan is not None:
+            self._keep(senses, poses)
+        ends = self.plan is not None and self.plan.course.last_u_m - self.plan.u_m < LOOK_M
+        wants_goal = best.share > LIKELY and not self._to_goal
+        if (self.agreed_m < LEAST_M or ends or wants_goal) and self._since_try_m >= TRY_EVERY_M:
+            self._since_try_m = 0.0
+            self._try(best, poses, senses)
+
+    def _follow(self, best: Place) -> None:
+        """Take the pose to the particles about it, or give it up for a place that is much likelier."""
+        if self.pose is None:
+            return
+        mine = self.whereabouts.near(self.pose)
+        if mine.share < RIVAL * best.share:
+            self.plan = self.pose = None
+            return
+        off = mine.pose - self.pose
+        off[2] = wrap(off[2])
+        self.pose = self.pose + PULL * off
+
+    def _keep(self, senses: Senses, poses: FloatArray) -> None:
+        """See how far the present way is agreed on; give it up where it leads off the road."""
+        assert self.plan is not None and self.pose is not None
+        course = self.plan.course
+        ahead = se2.between(self.pose, path_poses(course, self.plan.u_m, self.plan.u_m + LOOK_M)[::4])
+        self.agreed_m, self.guessed_m = self._reach_m(self._field.agreed(ahead[None], poses)[0])
+        self._off_road = self._off_road + 1 if self._leads_off_road(senses, ahead) else 0
+        if self._off_road >= OFF_ROAD_LOOKS:
+            self.plan, self.agreed_m, self.guessed_m, self._off_road = None, 0.0, 0.0, 0
+
+    def _leads_off_road(self, senses: Senses, ahead: FloatArray) -> bool:
+        """Whether a way (n, 3), in the vehicle's axes, is seen to lead where there is no road."""
+        near = ahead[(ahead[:, 0] > AHEAD_M[0]) & (np.hypot(ahead[:, 0], ahead[:, 1]) < AHEAD_M[1])]
+        if len(near) == 0:
+            return False
+        left = np.stack([-np.sin(near[:, 2]), np.cos(near[:, 2])], axis=1)
+        points = np.concatenate([near[:, :2] + aside * left for aside in (-HALF_BODY_M, 0.0, HALF_BODY_M)])
+        return senses.ground.off_road_share(points) > OFF_ROAD
+
+    def _try(self, best: Place, poses: FloatArray, senses: Senses) -> None:
+        """Look for a way that is agreed on for longer than the present one."""
+        if best.share > LIKELY and self._try_goal(best, poses, senses):
+            return
+        network, lengths_m = self._planner.roads.network, self._planner.roads.lane_length_m
+        starts = [best.pose, *poses[:: max(len(poses) // TRIED, 1)]]
+        grid_m = np.arange(0.0, LOOK_M + 0.1, WAY_STEP_M)
+        found: list[tuple[FloatArray, list[Piece], FloatArray, float]] = []
+        for pose in starts:
+            place = lane_of(self._planner.roads, pose)
+            if place is None:
+                continue
+            for pieces in ways_ahead(network, lengths_m, place.lane, place.position_m, LOOK_M):
+                if not pieces or pieces[0].lane != place.lane:
+                    continue
+                way = way_poses(network, pieces, grid_m, place.position_m)
+                ahead = se2.between(pose, way)
+                if len(way) > 1 and not self._leads_off_road(senses, ahead):
+                    found.append((pose, pieces, ahead, place.position_m))
+        if not found:
+            return
+        ways = np.full((len(found), len(grid_m), 3), 1e6)
+        for k, (_, _, ahead, _) in enumerate(found):
+            ways[k, : len(ahead)] = ahead
+        far = [self._reach_m(share) for share in self._field.agreed(ways, poses)]
+        k = max(range(len(far)), key=lambda one: (far[one][0] >= LEAST_M, sum(far[one])))
+        now = self.agreed_m >= LEAST_M, self.agreed_m + self.guessed_m
+        if far[k][1] >= LEAST_M and (far[k][0] >= LEAST_M, sum(far[k])) > now:
+            pose, pieces, _, position_m = found[k]
+            self._drive(pose, pieces, position_m, far[k])
+
+    @staticmethod
+    def _reach_m(share: FloatArray) -> tuple[float, float]:
+        """How far a way is agreed on, and how far it is a guess."""
+        return agreed_m(share, AGREED), agreed_m(share, GUESSED)
+
+    def _try_goal(self, best: Place, poses: FloatArray, senses: Senses) -> bool:
+        """Plan from the likeliest place; whether that is agreed on."""
+        plan = self._planner.plan(best.pose, 0.0)
+        if plan is not None and plan.to_goal_m < NEAR_GOAL_M:
+            plan = self._planner.plan(best.pose, 0.0, beyond_goal=True)
+        if plan is None:
+            return False
+        ahead = se2.between(best.pose, path_poses(plan.course, plan.u_m, plan.u_m + LOOK_M)[::4])
+        far_m = self._reach_m(self._field.agreed(ahead[None], poses)[0])
+        if far_m[0] < LEAST_M or self._leads_off_road(senses, ahead):
+            return False
+        self.plan, self.pose, self._to_goal = plan, best.pose, True
+        self.agreed_m, self.guessed_m = far_m
+        return True
+
+    def _drive(self, pose: FloatArray, pieces: Sequence[Piece], position_m: float, far_m: tuple[float, float]) -> None:
+        """Take a way."""
+        network = self._planner.roads.network
+        pieces = drawn_on(network, self._planner.roads.lane_length_m, pieces, WAY_M)
+        course: Course = make_course(network, pieces, pieces[-1].lane, pieces[-1].end_m, self._config.drive, self._config.vehicle)
+        u_m = place_on(course, pose, min(position_m - pieces[0].begin_m, course.last_u_m))
+        self.plan, self.pose, self._to_goal = Plan(course, u_m), pose, False
+        self.agreed_m, self.guessed_m = far_m
+
+    def command(self, radar: Radar, speed_mps: float) -> Command | None:
+        """What to do on the way that is agreed on; None where that is too short."""
+        config = self._config
+        left_m, most_mps, reason = self.agreed_m - self._since_look_m, GUIDED_MPS, REASON
+        if left_m < LEAST_M - 1.0:
+            left_m, most_mps, reason = self.guessed_m - self._since_look_m, GUESSED_MPS, GUESS
+        if self.plan is None or self.pose is None or left_m < LEAST_M - 1.0:
+            return None
+        step = pace(self.plan.course, self.plan.u_m, speed_mps, radar, 0.0, config.drive, config.vehicle)
+        agreed_mps = max(stopping_mps(left_m - SPARE_M, config.drive.braking_mps2), config.drive.creep_mps)
+        wanted = min(step.speed_mps, most_mps, agreed_mps)
+        accel = min(
+            approach_mps2(speed_mps, wanted, config.drive), following_mps2(speed_mps, radar, config.drive, config.vehicle)
+        )
+        accel = min(accel, stop_mps2(speed_mps, step.to_stop_m, config.drive, config.vehicle))
+        bend = path_curvature_1pm(self.plan.course, self.plan.u_m, self.pose, speed_mps, config.drive)
+        wheel = steering_rad(bend, speed_mps, config.drive, config.vehicle)
+        return Command(accel, wheel, step.indicator, DrivingState.SEARCHING, step.reason or reason)
+
+
+def moved(pose: FloatArray, distance_m: float, turned_rad: float) -> FloatArray:
+    """A pose after a short arc."""
+    chord = pose[2] + 0.5 * turned_rad
+    step = np.array([distance_m * math.cos(chord), distance_m * math.sin(chord), turned_rad])
+    after: FloatArray = pose + step
+    return after

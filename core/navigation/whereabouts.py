@@ -1,0 +1,298 @@
+"""Where the vehicle may be, while it is not known: hypotheses all over the road network, thinned out by what is sensed.
+
+The particles themselves are in ``hypotheses``. Here they are begun, weighed by what ``Senses`` makes of the frames, renewed where
+few of them carry the weight, and asked: which places are left, and how much speaks for the likeliest of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from hippodrome.core.navigation import hypotheses as hyp
+from hippodrome.core.navigation.paving import LEVEL_M, MOST_LEVEL, Paving, paving
+from hippodrome.core.navigation.senses import Senses
+from hippodrome.core.navigation.track import STOP_LINE_BEFORE_END_M
+from hippodrome.core.reading.types import LaneEnd, RoadReading
+from hippodrome.core.roads.geometry import RoadGeometry, poses_on_segments
+from hippodrome.core.se2 import wrap
+from hippodrome.core.types import FloatArray, IntArray
+
+SPACING_M: Final = 1.0  # between the particles at the beginning ..
+MOST, LEAST = 8000, 500  # .. and the most of them, and the least later
+ROOM: Final = 2000  # for those that split
+PER_BIN, BIN_M = 15, 2.0  # later there are so many for each stretch of lane on which there are any
+LOOK_EVERY_M: Final = 1.0  # the ground is compared so often ..
+GROUND_PER_M: Final = 0.06  # .. and each point of it counts so much per metre: it is seen over and over again
+EDGE_M, BLUR_M, OUTLIER = 0.2, 0.3, 0.2  # the paving's edge is seen so far inside, so blurred; and what is seen wrongly
+READ_SIGMA_M, READ_GATE_M, READ_GATE_RAD, READ_GAIN, READ_WEIGHT = 0.4, 1.2, 0.35, 0.2, 0.15
+END_SIGMA_M, END_OUTLIER, END_WEIGHT = 0.8, 0.2, 0.3
+TOLD_M, TOLD_RAD, TOLD_OUTLIER, TOLD_PER_M = 1.5, 0.3, 0.02, 0.4  # of the localizer's pose, whose errors repeat
+SURE_M2: Final = 0.05  # variance of an offset in the lane that is taken in
+JITTER: Final = (0.15, 0.15, 0.006, 0.15)  # of renewed particles: m, m, rad, and standard deviations of the scale
+WIDE, WIDE_EVERY = 6.0, 10  # of every so many renewed ones one gets so much more, in case all are a little wrong
+LEAST_SCALE_SIGMA: Final = 0.08  # of ln(scale): dashes that were counted wrongly are worse than they know
+SCALE_MEMORY_M: Final = 60.0  # over which a scale is forgotten
+LOST, LOST_PER_M = 0.75, 0.15  # the ground as the likeliest place has it, averaged over some 7 m: below that all are wrong
+CLUSTER_M, CLUSTER_RAD = 5.0, 0.7  # particles so near to one another are of one place
+LEAST_POINTS: Final = 20  # of the ground, which must be known
+FORWARD_M, ASIDE_M, GRID_M = (-3.0, 13.0), 7.0, 1.0  # of the ground that is compared
+SEED: Final = 17
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Place:
+    """A place where the vehicle may be.
+
+    Args:
+        pose: (3,) the mean of the particles there, in the network frame.
+        covariance: (3, 3) of them.
+        share: of all the weight.
+        agreement: share of the ground about it that is as the network says, averaged over the last metres.
+    """
+
+    pose: FloatArray
+    covariance: FloatArray
+    share: float
+    agreement: float
+
+    @property
+    def sigma_m(self) -> float:
+        """Standard deviation of the position, over both axes."""
+        return math.sqrt(max(float(self.covariance[0, 0] + self.covariance[1, 1]), 0.0))
+
+    def at(self, pose: FloatArray) -> Place:
+        """The place with another pose."""
+        return replace(self, pose=pose)
+
+
+class Whereabouts:
+    """The hypotheses of the vehicle's place.
+
+    Args:
+        roads: the network.
+        seed: of the particles: the same seed and the same observations give the same places.
+    """
+
+    def __init__(self, roads: RoadGeometry, seed: int = SEED) -> None:
+        self._roads, self._seed = roads, seed
+        self._paving: Paving = paving(roads.network)
+        self._cost = _ground_cost()
+        self._grid = _ground_points()
+        network = roads.network
+        self._lanes = (
+            roads.segment_lane, roads.segment_start, roads.segment_begin_m, roads.segment_direction, roads.segment_length_m,
+            roads.segment_position_m, network.successor.astype(np.int32), network.successor_start.astype(np.int32),
+            network.left_lane.astype(np.int32), network.right_lane.astype(np.int32), network.width_m.astype(np.float64),
+            roads.lane_length_m,
+        )  # fmt: skip
+        self.restarts = 0
+        self.begin()
+
+    def begin(self, offset_m: float = 0.0, heading_rad: float = 0.0) -> None:
+        """Begin anew: the vehicle may be anywhere, beside the middle of a lane by an offset and turned against it."""
+        self._rng = np.random.default_rng(self._seed)
+        lengths = self._roads.lane_length_m
+        wanted = min(max(int(lengths.sum() / SPACING_M), LEAST), MOST)
+        at_m = (np.arange(wanted) + 0.5) / wanted * float(lengths.sum())
+        ends = np.cumsum(lengths)
+        lane = np.minimum(np.searchsorted(ends, at_m, side="right"), len(lengths) - 1)
+        position = np.clip(at_m - (ends - lengths)[lane], 0.0, lengths[lane])
+        poses = poses_on_segments(self._roads, lane, position)
+        self._rows = np.zeros((wanted + ROOM, hyp.COLUMNS))
+        self._segments: IntArray = np.zeros(wanted + ROOM, dtype=np.int32)
+        self._count = self._first = wanted
+        rows = self._rows[:wanted]
+        rows[:, hyp.X] = poses[:, 0] - offset_m * np.sin(poses[:, 2])
+        rows[:, hyp.Y] = poses[:, 1] + offset_m * np.cos(poses[:, 2])
+        rows[:, hyp.HEADING] = wrap(poses[:, 2] + heading_rad)
+        rows[:, hyp.SCALE] = self._rng.standard_normal(wanted)
+        rows[:, hyp.ALONG], rows[:, hyp.ASIDE], rows[:, hyp.TURN] = position, offset_m, heading_rad
+        self._segments[:wanted] = _segment_at(self._roads, lane, position)
+        self._agreement = np.ones(wanted + ROOM)
+        self.fits = 1.0
+        self._since_look_m = self.driven_m = 0.0
+        self._phase, self._scale_sigma = 0, LEAST_SCALE_SIGMA
+
+    @property
+    def count(self) -> int:
+        """How many particles there are."""
+        return self._count
+
+    @property
+    def log_scale(self) -> float:
+        """By how much the particles' scale differs from the one that their metres were measured with: ln of the ratio."""
+        return self._scale_sigma * float(self._shares() @ self._rows[: self._count, hyp.SCALE])
+
+    def step(
+        self, distance_m: float, turned_rad: float, senses: Senses, scale_sigma: float, told: FloatArray | None = None
+    ) -> None:
+        """Take a step of the vehicle in.
+
+        Args:
+            distance_m: driven.
+            turned_rad: meanwhile.
+            senses: what is sensed.
+            scale_sigma: standard deviation of ln(scale).
+            told: (3,) the pose by the localizer, where it recognised a view.
+        """
+        if distance_m == 0.0 and turned_rad == 0.0:
+            return
+        self.driven_m += abs(distance_m)
+        self._since_look_m += abs(distance_m)
+        self._scale_sigma = max(scale_sigma, LEAST_SCALE_SIGMA)
+        self._count = hyp.move(self._rows, self._segments, self._count, distance_m, turned_rad, self._scale_sigma, *self._lanes)
+        if senses.reading is not None and distance_m != 0.0:
+            self._read(senses.reading)
+        if self._since_look_m >= LOOK_EVERY_M:
+            self._wander(self._since_look_m)
+            if told is not None:
+                weight = TOLD_PER_M * self._since_look_m
+                hyp.weigh_by_pose(self._rows, self._count, told, TOLD_M, TOLD_RAD, TOLD_OUTLIER, weight)
+            if self._look(senses, self._since_look_m):
+                self._doubt(senses, self._since_look_m)
+            self._since_look_m = 0.0
+            self._renew()
+
+    def _read(self, reading: RoadReading) -> None:
+        """Weigh by the lane that was read."""
+        internal, lanes = self._roads.network.is_internal, self._roads.segment_lane
+        if reading.offset_variance_m2 < SURE_M2 and math.isfinite(reading.heading_rad):
+            hyp.correct_by_lane(
+                self._rows, self._segments, self._count, lanes, internal, self._roads.segment_direction, reading.offset_m,
+                reading.heading_rad, READ_SIGMA_M, READ_GATE_M, READ_GATE_RAD, READ_GAIN, READ_WEIGHT,
+            )  # fmt: skip
+        if reading.end is not LaneEnd.NOTHING and math.isfinite(reading.end_m):
+            end_m = reading.end_m + (STOP_LINE_BEFORE_END_M if reading.end is LaneEnd.STOP_LINE else 0.0)
+            sigma_m = math.hypot(END_SIGMA_M, math.sqrt(min(reading.end_variance_m2, 100.0)))
+            hyp.weigh_by_end(
+                self._rows, self._segments, self._count, lanes, internal, self._roads.lane_length_m, end_m, sigma_m,
+                END_OUTLIER, END_WEIGHT,
+            )  # fmt: skip
+
+    def _wander(self, driven_m: float) -> None:
+        """Let the scales wander, as that of the odometry does: an Ornstein-Uhlenbeck process that keeps its spread."""
+        kept = math.exp(-driven_m / SCALE_MEMORY_M)
+        scale = self._rows[: self._count, hyp.SCALE]
+        scale *= kept
+        scale += math.sqrt(1.0 - kept**2) * self._rng.standard_normal(self._count)
+
+    def _look(self, senses: Senses, driven_m: float) -> bool:
+        """Weigh by the ground; whether there is enough of it in sight."""
+        self._phase = 1 - self._phase
+        points = self._grid[self._phase]
+        kinds = senses.ground.kinds_at(points)
+        known = (kinds == 1) | (kinds == 2)
+        if known.sum() < LEAST_POINTS:
+            return False
+        hyp.see(
+            self._rows, self._count, np.ascontiguousarray(points[known]), np.ascontiguousarray(kinds[known]), 2,
+            self._paving.levels, self._paving.corner_m, self._paving.cell_m, self._cost, GROUND_PER_M * driven_m,
+            self._agreement,
+        )  # fmt: skip
+        return True
+
+    def _doubt(self, senses: Senses, driven_m: float) -> None:
+        """Begin anew where not even the likeliest hypotheses have the ground as it is."""
+        self.fits += min(LOST_PER_M * driven_m, 1.0) * (float(self._shares() @ self._agreement[: self._count]) - self.fits)
+        if self.fits < LOST:
+            memory = senses.memory
+            self.begin(*((memory.offset_m, memory.heading_rad) if memory.is_fresh else (0.0, 0.0)))
+            self.restarts += 1
+
+    def _shares(self) -> FloatArray:
+        """The weights (n,), adding up to 1."""
+        logs = self._rows[: self._count, hyp.WEIGHT]
+        share = np.exp(logs - logs.max())
+        total: FloatArray = share / share.sum()
+        return total
+
+    def _renew(self) -> None:
+        """Resample where few particles carry the weight."""
+        share = self._shares()
+        self._rows[: self._count, hyp.WEIGHT] -= self._rows[: self._count, hyp.WEIGHT].max()
+        if 1.0 / float(share @ share) > 0.5 * self._count and self._count <= self._first:
+            return
+        heavy = share > 1e-3 / len(share)
+        bins = np.unique(self._segments[: self._count][heavy].astype(np.int64) * 4096
+                         + (self._rows[: self._count, hyp.ALONG][heavy] / BIN_M).astype(np.int64))  # fmt: skip
+        wanted = min(max(PER_BIN * len(bins), LEAST), self._first)
+        chosen = hyp.resampled(self._rows, self._segments, share, wanted, float(self._rng.random()))
+        rows, segments = self._rows[chosen], self._segments[chosen]
+        again = np.concatenate([[False], chosen[1:] == chosen[:-1]])
+        noise = self._rng.standard_normal((wanted, 4)) * JITTER
+        noise[np.arange(wanted) % WIDE_EVERY == 0] *= WIDE
+        for k, column in enumerate((hyp.X, hyp.Y, hyp.HEADING, hyp.SCALE)):
+            rows[again, column] += noise[again, k]
+        rows[:, hyp.WEIGHT] = 0.0
+        self._agreement[:wanted] = self._agreement[chosen]
+        self._rows[:wanted], self._segments[:wanted], self._count = rows, segments, wanted
+
+    def sample(self, count: int) -> FloatArray:
+        """Poses (count, 3) that stand for all of the weight in equal parts."""
+        chosen = hyp.resampled(self._rows, self._segments, self._shares(), count, 0.5)
+        poses: FloatArray = self._rows[chosen, :3]
+        return poses
+
+    def best(self) -> Place:
+        """The likeliest place: about the heaviest cell of a grid, all that is near."""
+        share, rows = self._shares(), self._rows[: self._count]
+        cells = np.floor(rows[:, :2] / CLUSTER_M).astype(np.int64)
+        quarter = np.floor((rows[:, hyp.HEADING] + math.pi) / (0.5 * math.pi)).astype(np.int64) % 4
+        key = (cells[:, 0] * 100_003 + cells[:, 1]) * 4 + quarter
+        inverse = np.unique(key, return_inverse=True)[1]
+        heaviest = int(np.argmax(np.bincount(inverse, weights=share)))
+        mine = inverse == heaviest
+        centre = np.array([*(share[mine] @ rows[mine, :2] / share[mine].sum()), _mean_rad(rows[mine, hyp.HEADING], share[mine])])
+        return self.near(centre, share)
+
+    def near(self, pose: FloatArray, share: FloatArray | None = None) -> Place:
+        """The place of all the particles about a pose."""
+        share, rows = self._shares() if share is None else share, self._rows[: self._count]
+        centre = pose
+        for _ in range(2):
+            apart = rows[:, :2] - centre[:2]
+            turned = wrap(rows[:, hyp.HEADING] - centre[2])
+            mine = (np.einsum("ij,ij->i", apart, apart) < CLUSTER_M**2) & (np.abs(turned) < CLUSTER_RAD)
+            total = float(share[mine].sum())
+            if total <= 0.0:
+                return Place(pose, np.diag([CLUSTER_M**2, CLUSTER_M**2, 1.0]), 0.0, 0.0)
+            part = share[mine] / total
+            mean = part @ np.column_stack([apart[mine], turned[mine]])
+            centre = centre + mean
+        off = np.column_stack([rows[mine, :2] - centre[:2], wrap(rows[mine, hyp.HEADING] - centre[2])])
+        covariance = (part[:, None] * off).T @ off
+        agreement = float(part @ self._agreement[: self._count][mine])
+        return Place(np.array([centre[0], centre[1], wrap(centre[2])]), covariance, total, agreement)
+
+
+def _mean_rad(angles: FloatArray, share: FloatArray) -> float:
+    return math.atan2(float(share @ np.sin(angles)), float(share @ np.cos(angles)))
+
+
+def _segment_at(roads: RoadGeometry, lane: IntArray, position_m: FloatArray) -> IntArray:
+    """The segment (n,) of each lane at an arc length."""
+    offset = np.concatenate([[0.0], np.cumsum(roads.lane_length_m)])
+    begins = roads.segment_position_m + offset[roads.segment_lane]
+    segment = np.searchsorted(begins, position_m + offset[lane], side="right") - 1
+    clipped: IntArray = np.clip(segment, roads.segment_start[lane], roads.segment_start[lane + 1] - 1).astype(np.int32)
+    return clipped
+
+
+def _ground_points() -> tuple[FloatArray, FloatArray]:
+    """The places ahead of the vehicle that are compared, in two lots that take turns, as the colours of a chess board do."""
+    x, y = np.meshgrid(np.arange(*FORWARD_M, GRID_M), np.arange(-ASIDE_M, ASIDE_M + 0.1, GRID_M), indexing="ij")
+    parity = (np.arange(x.shape[0])[:, None] + np.arange(x.shape[1])[None, :]) % 2
+    points = np.stack([x, y], axis=-1)
+    return np.ascontiguousarray(points[parity == 0]), np.ascontiguousarray(points[parity == 1])
+
+
+def _ground_cost() -> FloatArray:
+    """What it costs (2, 2 * MOST_LEVEL + 1) to see road, and to see none, at each level of the raster: -ln of its probability."""
+    distance = LEVEL_M * np.arange(-MOST_LEVEL, MOST_LEVEL + 1)
+    paved = 1.0 / (1.0 + np.exp((EDGE_M - distance) / BLUR_M))
+    road = 0.5 * OUTLIER + (1.0 - OUTLIER) * paved
+    return np.stack([-np.log(road), -np.log(1.0 - road)])

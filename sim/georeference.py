@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from hippodrome._files import why_unreadable
 from hippodrome.core.types import FloatArray, HippodromeError, StartPose
 from hippodrome.sim.geo_start import GeoStart
 
@@ -148,7 +149,7 @@ def _location(net_file: Path) -> dict[str, str]:
                     if element.tag == "location":
                         return {str(name): str(value) for name, value in element.attrib.items()}
     except (OSError, EOFError, zlib.error) as error:
-        raise GeoReferenceError(f"{net_file}: cannot be read: {error}") from None
+        raise GeoReferenceError(f"{net_file}: cannot be read: {why_unreadable(error)}") from None
     except ElementTree.ParseError as error:
         raise GeoReferenceError(f"{net_file}: not a SUMO network: {error}") from None
     raise GeoReferenceError(f"{net_file}: not a SUMO network (no <location> in it)")

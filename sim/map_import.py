@@ -8,7 +8,7 @@ import zlib
 from pathlib import Path
 from typing import Final
 
-from hippodrome._files import replacing, sha256_of, write_atomically
+from hippodrome._files import replacing, sha256_of, why_unreadable, write_atomically
 from hippodrome._folders import temporary_folder
 from hippodrome.core.types import HippodromeError
 from hippodrome.sim.driving_side import Choice, DrivingSide, opendrive_side, osm_side
@@ -241,7 +241,7 @@ def _unpack(source: Path, plain: Path) -> None:
                 if out.tell() > MAX_UNPACKED_BYTES:
                     raise _too_large(source)
     except (OSError, EOFError, zlib.error) as error:
-        raise HippodromeError(f"{source}: cannot be read: {error}") from error
+        raise HippodromeError(f"{source}: cannot be read: {why_unreadable(error)}") from error
 
 
 def _too_large(source: Path) -> HippodromeError:

@@ -23,6 +23,7 @@ from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.traffic_spec import TrafficSpec
 from hippodrome.sim.yaml_file import load_yaml
 
+SCENARIO_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # results are filed under it
 METHOD_NAME = r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$"  # of a method: it stands in tables, and files are named after it
 MethodName = Annotated[str, Field(pattern=METHOD_NAME)]
 
@@ -61,7 +62,7 @@ class Thresholds(Spec):
 class Scenario(Spec):
     """A town, two different drives through it (one to map, one to localize), what is sensed, and how the result is judged."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+    name: Annotated[str, Field(pattern=SCENARIO_NAME)]
     description: str = ""
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
     town: TownSpec = TownSpec()

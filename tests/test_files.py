@@ -28,6 +28,15 @@ def test_a_file_takes_its_name_when_the_block_ends(tmp_path):
     assert names(path.parent) == ["a.txt"]
 
 
+def test_the_reason_of_an_unreadable_file_is_in_words_and_names_no_file(tmp_path):
+    with pytest.raises(OSError, match="No such file") as told:
+        _files.read_bounded(tmp_path / "none", 9)
+    assert _files.why_unreadable(told.value) == "No such file or directory"
+    assert _files.why_unreadable(OSError("not a regular file")) == "not a regular file"
+    assert _files.why_unreadable(ValueError("two\nlines")) == "two lines"
+    assert _files.why_unreadable(RecursionError()) == "RecursionError"
+
+
 def test_an_error_leaves_what_was_there(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("precious")

@@ -96,6 +96,14 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
     return data
 
 
+def why_unreadable(error: Exception) -> str:
+    """Why a file cannot be read, in words: the system's own for an ``OSError``, without its number and the name of the file.
+
+    The caller's sentence has the name already, and "[Errno 2] No such file or directory: 'a/b'" would say it twice.
+    """
+    return (isinstance(error, OSError) and error.strerror) or " ".join(str(error).split()) or type(error).__name__
+
+
 def _open_without_waiting(name: str, flags: int) -> int:
     """Open a file; a named pipe would block until somebody writes to it."""
     return os.open(name, flags | os.O_NONBLOCK)

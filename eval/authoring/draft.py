@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -19,7 +20,7 @@ from hippodrome.eval.files.scenarios import PACKAGE, located
 from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
 from hippodrome.sim.net_cut import Around, cut_network, import_options
-from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.scenario import SCENARIO_NAME, Scenario
 from hippodrome.sim.tour import tour_graph
 from hippodrome.sim.town import build_town
 from hippodrome.sim.town_spec import TownSpec
@@ -85,6 +86,11 @@ def new_scenario(name: str, source: str, path: Path, driving_side: Choice = "aut
     Raises:
         HippodromeError: The source or the name cannot be used, or a file that would be written exists.
     """
+    if not re.fullmatch(SCENARIO_NAME, name):
+        raise HippodromeError(
+            f"'{name}': not a scenario's name, which folders are given: letters, digits, '.', '_', '-', "
+            "a letter or digit first, at most 64; name it so, and the file as you like with --out"
+        )
     if around and source in KINDS:
         raise HippodromeError(f"--around {around.first:g},{around.second:g}: '{source}' is generated; only a map is cut out of")
     network = path.with_name(f"{path.stem}.net.xml.gz") if around or _is_imported(source) else None

@@ -62,7 +62,7 @@ def _reason(one: Mapping[str, Any], place: str) -> str:
         return "takes keys of its own; docs/scenarios.md lists them"
     if one["type"] == "string_pattern_mismatch":
         return next(key.meaning for key in scenario_keys() if key.name == place)
-    message = str(one["msg"]).removeprefix("Value error, ")
+    message = str(one["msg"]).removeprefix("Value error, ").partition(", unable to parse")[0]
     given = one.get("input")
     return f"{message}, not {given!r}" if isinstance(given, str | int | float) and "Input should" in message else message
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hippodrome._files import why_unreadable
 from hippodrome.eval.files.trajectories import MAX_BYTES
 from hippodrome.eval.metrics.association import TrajectoryError
 
@@ -15,7 +16,7 @@ def text_lines(path: Path) -> list[str]:
             raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
         return path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise TrajectoryError(f"{path}: cannot be read as text: {error}") from None
+        raise TrajectoryError(f"{path}: cannot be read as text: {why_unreadable(error)}") from None
 
 
 def row_of_numbers(path: Path, number: int, words: list[str], width: int) -> list[float]:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from hippodrome._files import write_atomically
+from hippodrome._files import why_unreadable, write_atomically
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.metrics.association import TrajectoryError, check_trajectory
 
@@ -79,7 +79,7 @@ def read_lines(path: Path) -> list[str]:
             raise TrajectoryError(f"{path}: {count} lines, the limit is {MAX_LINES}")
         return data.decode("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise TrajectoryError(f"{path}: cannot be read as text: {error}") from error
+        raise TrajectoryError(f"{path}: cannot be read as text: {why_unreadable(error)}") from error
 
 
 def _time(path: Path, number: int, line: str) -> float:

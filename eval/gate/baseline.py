@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from hippodrome._files import read_bounded, write_atomically
+from hippodrome._files import read_bounded, why_unreadable, write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.results.model import (
     MAX_BYTES,
@@ -105,7 +105,8 @@ def read_baseline(path: Path) -> Baseline:
         place = ".".join(str(part) for part in first["loc"])
         raise GateError(f"{path}: {place or 'top level'}: {first['msg']}") from error
     except (OSError, ValueError, RecursionError) as error:  # ValueError: no JSON, no UTF-8, or a number of thousands of digits
-        raise GateError(f"{path}: not a readable baseline: {error}") from error
+        cure = "name another, or make it anew with --update"
+        raise GateError(f"{path}: not a readable baseline: {why_unreadable(error)}; {cure}") from error
 
 
 def question_of(result: ScenarioResult) -> str:

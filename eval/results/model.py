@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from hippodrome._files import read_bounded, write_atomically
+from hippodrome._files import read_bounded, why_unreadable, write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.metrics.localization import LocalizationScore
 from hippodrome.eval.metrics.trajectory import Score
@@ -187,7 +187,10 @@ def read_results(path: Path) -> Results:
         place = ".".join(str(part) for part in first["loc"])
         raise ResultsError(f"{path}: {place or 'top level'}: {first['msg']}") from error
     except (OSError, ValueError, RecursionError) as error:  # ValueError: no JSON, no UTF-8, or a number of thousands of digits
-        raise ResultsError(f"{path}: not a readable results file: {error}") from error
+        cure = "name the folder that a command had as its --out, and let that command finish"
+        if isinstance(error, FileNotFoundError | NotADirectoryError):
+            raise ResultsError(f"{path}: no results there; {cure}") from error
+        raise ResultsError(f"{path}: not a readable results file: {why_unreadable(error)}; {cure}") from error
 
 
 def without_timings(results: Results) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from hippodrome._files import read_bounded
+from hippodrome._files import read_bounded, why_unreadable
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.sim.yaml_file import MAX_BYTES, ScenarioError, parse_yaml
@@ -51,7 +51,7 @@ def read_lines(path: Path) -> list[str]:
     try:
         return read_bounded(path, MAX_TABLE_BYTES).decode("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise ExchangeError(f"{path}: cannot be read as text: {error}") from None
+        raise ExchangeError(f"{path}: cannot be read as text: {why_unreadable(error)}") from None
 
 
 def read_values(path: Path, text: str) -> Any:

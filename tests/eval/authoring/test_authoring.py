@@ -73,7 +73,7 @@ def test_new_refuses_names_that_no_scenario_may_have_or_quotes_them(tmp_path, na
         new_scenario(name, "grid", path)
         assert load_scenario(path).name == "yes"
         return
-    with pytest.raises(HippodromeError, match=r"a\.yaml:\d+: name: "):
+    with pytest.raises(HippodromeError, match="not a scenario's name, which folders are given: letters, digits"):
         new_scenario(name, "grid", path)
     assert not path.exists()
 

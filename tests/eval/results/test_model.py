@@ -102,6 +102,14 @@ def test_bad_files_are_named_with_field_and_reason(tmp_path, text, complaint):
         read_results(path)
 
 
+@pytest.mark.parametrize("below", ["results.json", "file/results.json"])
+def test_where_no_results_are_the_answer_says_so_in_words(tmp_path, below):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ResultsError, match=r"results\.json: no results there; name the folder that a command had") as told:
+        read_results(tmp_path / below)
+    assert "Errno" not in str(told.value)
+
+
 def test_a_nan_in_a_file_is_refused(tmp_path):
     path = tmp_path / "results.json"
     write_results(path, results())

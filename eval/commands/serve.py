@@ -33,6 +33,8 @@ def add_serve_command(commands: Any) -> None:
 
 
 def _port(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number")
     port = int(text)
     if not 0 <= port < 65536:
         raise argparse.ArgumentTypeError(f"{port} is not between 0 and 65535")

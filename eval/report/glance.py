@@ -26,7 +26,7 @@ def at_a_glance(results: Results, found: Sequence[ScenarioFiles]) -> Html:
     if localized := _localized(results, best):
         answers.append(("Second drive", localized))
     answers.append(("Refused or failed", _troubles(results)))
-    answers.append(("Run it again", element("code", _command(results.scenarios))))
+    answers.append(("Run it again", joined(element("code", _command(results.scenarios)), ", typed in the folder of this page.")))
     return element("dl", [joined(element("dt", name), element("dd", words)) for name, words in answers], class_="glance")
 
 

@@ -144,3 +144,9 @@ def test_faults_of_a_scenario_are_said_as_validate_says_them_all_at_once(command
         said.append(capsys.readouterr().err)
     assert said[0] == said[1]
     assert "did you mean seed?" in said[0] and "rate_hz" in said[0] and len(said[0].splitlines()) >= 2
+
+
+def test_a_port_that_is_no_number_is_refused_in_words(capsys):
+    with pytest.raises(SystemExit):
+        main(["serve", "out", "--port", "abc"])
+    assert "'abc' is not a whole number" in capsys.readouterr().err

@@ -84,7 +84,7 @@ def _digest(arrays: dict[str, Any]) -> str:
     for name in sorted(arrays.keys() - {"words"}):
         array = np.ascontiguousarray(arrays[name])
         digest.update(f"{name} {array.dtype.str} {array.shape} ".encode())
-        digest.update(memoryview(array).cast("B") if array.size else b"")
+        digest.update(array.tobytes())
     return digest.hexdigest()
 
 

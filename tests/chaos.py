@@ -24,7 +24,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.same.folders import compare_folders
-from tests.families import command_line, kill, session, started_with
+from tests.families import command_line, kill, session, started_with, with_default_signals
 
 SCENARIO: Final = """\
 name: tiny
@@ -124,7 +124,7 @@ class Chaos:
         environment = {**os.environ, "TMPDIR": str(self.temporary), "PYTHONPATH": path}
         words = [*within, sys.executable, "-m", "hippodrome.eval.cli", *words]
         return subprocess.Popen(words, env=environment, start_new_session=True, stdout=subprocess.DEVNULL,
-                                stderr=subprocess.PIPE, text=True)  # fmt: skip
+                                stderr=subprocess.PIPE, text=True, preexec_fn=with_default_signals)  # fmt: skip
 
     def undisturbed(self, command: str) -> Path:
         """The results of a run that nobody disturbs; made once."""
@@ -158,7 +158,7 @@ class Chaos:
             while time.monotonic() - began < attempt.share * self.took_s[attempt.command] and process.poll() is None:
                 time.sleep(0.02)
             _hit(process, attempt)
-            faults = self.faults_of_end(process, ENDS[attempt.target])
+            faults = self.faults_of_end(process, (*ENDS[attempt.target], self.status[attempt.command]))
         status, said = self.ended(self.start(attempt.command, out))
         return faults + self.faults_of_rerun(status, said, whole, out, self.status[attempt.command])
 
@@ -191,12 +191,11 @@ class Chaos:
             cluster.communicate("")
         return [] if status == 0 else [f"ended: a sweep that lost a worker with {status}: {said[-300:]}"]
 
-    def faults_of_end(self, process: subprocess.Popen[str], ends: tuple[int, ...]) -> list[str]:
+    def faults_of_end(self, process: subprocess.Popen[str], ends: tuple[int | None, ...]) -> list[str]:
         """What is wrong with the end of a command that was disturbed; ``ends``: statuses that it may have beside 0."""
         status, said = self.ended(process)
-        faults = [] if status in (0, *ends) else [f"ended: status {status}: {said[-300:]}"]
-        if status is None:
-            faults = ["hang: the command that was hit"]
+        how = "hang: the command that was hit" if status is None else f"ended: status {status}: {said[-300:]}"
+        faults = [] if status in (0, *ends) else [how]
         lines = [line for line in said.strip().splitlines() if not EXPECTED_LINE.search(line)]
         if "Traceback" in said or (status not in (0, 1) and len(lines) > 1):
             faults.append(f"traceback: {said[-400:]}")

@@ -45,3 +45,9 @@ def kill(pid: int, number: str) -> None:
     """Send a signal of this name to a process that may have ended."""
     with contextlib.suppress(ProcessLookupError):
         os.kill(pid, getattr(signal, number))
+
+
+def with_default_signals() -> None:
+    """Between fork and exec: the signals do what they do at a terminal. In the background a shell has some of them ignored."""
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)

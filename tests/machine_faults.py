@@ -18,13 +18,14 @@ import numpy as np
 from tests.chaos import USUAL, Chaos
 
 KINDS: Final = ("disk full", "no inodes", "read-only", "temporary disk full", "folder deleted")
-# Arguments: the folder, size [KiB] (0: any), how many files (0: any), seconds until it is read-only (0: never), the folder to
-# which what was left is copied, and the command.
+# Arguments: the folder, size [KiB] (0: any), how many files (0: any), tenths of a second until it is read-only (0: never), the
+# folder to which what was left is copied, and the command.
 SCRIPT: Final = """\
 folder=$1; size=$2; files=$3; after=$4; kept=$5; shift 5
 mkdir -p "$folder"; mount -t tmpfs -o "size=${size}k,nr_inodes=$files" none "$folder" || exit 125
 if [ "$after" != 0 ]; then
-  (sleep "$after"; until mount -o remount,ro "$folder"; do sleep 0.05; done) >/dev/null 2>&1 & watch=$!
+  (n=0; while [ "$n" -lt "$after" ]; do sleep 0.1; n=$((n+1)); done
+   until mount -o remount,ro "$folder"; do sleep 0.1; done) >/dev/null 2>&1 & watch=$!
 fi
 "$@"; status=$?
 if [ "$after" != 0 ]; then kill "$watch"; wait "$watch" 2>/dev/null; fi
@@ -65,7 +66,7 @@ def suffered(chaos: Chaos, name: str, fault: MachineFault) -> list[str]:
     else:
         out.mkdir()
         process = chaos.start(fault.command, out, within=_within(chaos, whole, out, fault))
-    faults = chaos.faults_of_end(process, (1, 2) if fault.command == "drive" else (2,))
+    faults = chaos.faults_of_end(process, (2,) if fault.command == "eval" else (1, 2))  # 1: cells that failed, missions that fell
     if (kept := _kept(out)).exists() and "temporary" not in fault.kind:
         shutil.rmtree(out)
         kept.rename(out)
@@ -80,15 +81,15 @@ def _kept(out: Path) -> Path:
 def _within(chaos: Chaos, whole: Path, out: Path, fault: MachineFault) -> list[str]:
     """The words that run a command on a file system of its own."""
     files = [path for path in whole.rglob("*") if path.is_file()]
-    size_kb, inodes, after_s, folder = 0, 0, 0.0, out
+    size_kb, inodes, tenths, folder = 0, 0, 0, out
     if fault.kind == "disk full":
         size_kb = max(4, int(fault.share * sum(path.stat().st_size for path in files) / 1024))
     elif fault.kind == "no inodes":
         inodes = 2 + int(fault.share * len(list(whole.rglob("*"))))
     elif fault.kind == "read-only":
-        after_s = fault.share * chaos.took_s[fault.command]
+        tenths = max(1, round(10 * fault.share * chaos.took_s[fault.command]))
     else:
         size_kb, folder = max(4, int(400 * fault.share**4)), chaos.temporary
     _kept(out).mkdir()
-    numbers = (str(size_kb), str(inodes), f"{after_s:.1f}" if after_s else "0")
+    numbers = map(str, (size_kb, inodes, tenths))
     return ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", SCRIPT, "sh", str(folder), *numbers, str(_kept(out))]

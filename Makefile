@@ -8,6 +8,7 @@ SECONDS ?= 3600
 CASES ?= 3000
 KILLS ?= 20
 PAIRS ?= 4
+FAULTS ?= 5
 GATED := scenarios/gate/*.yaml --baseline scenarios/baseline.json
 
 .DEFAULT_GOAL := help
@@ -52,8 +53,8 @@ test: setup  ## the whole test suite, on real SUMO and real GL, in WORKERS proce
 fuzz: setup  ## break the inputs of all readers: CASES of them with SEED, for at most SECONDS
 	@$(BIN)/python -m tests.broken --cases $(CASES) --seed $(SEED) --seconds $(SECONDS)
 
-chaos: setup  ## kill KILLS commands, and run PAIRS in one folder; the reruns must give the same results
-	@$(BIN)/python -m tests.chaos --kills $(KILLS) --pairs $(PAIRS) --seed $(SEED) --seconds $(SECONDS)
+chaos: setup  ## kill KILLS commands, give FAULTS a faulty disk, and run PAIRS in one folder; the reruns must give the same results
+	@$(BIN)/python -m tests.chaos --kills $(KILLS) --faults $(FAULTS) --pairs $(PAIRS) --seed $(SEED) --seconds $(SECONDS)
 
 lint: setup  ## ruff and strict mypy
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from hippodrome.eval.commands.arguments import Command, HelpLayout, print_help
 from hippodrome.eval.commands.authoring import add_scenario_command
 from hippodrome.eval.commands.board import add_board_command
-from hippodrome.eval.commands.boundary import guarded, make_numba_cache
+from hippodrome.eval.commands.boundary import guarded, make_numba_cache, one_line
 from hippodrome.eval.commands.drive import add_mission_command
 from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands
@@ -62,7 +62,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser of all commands. ``command`` of the parsed options is the function that runs what was asked for."""
-    parser = argparse.ArgumentParser(prog="hippodrome", description=DESCRIPTION, epilog=EPILOG, formatter_class=HelpLayout)
+    parser = _Parser(prog="hippodrome", description=DESCRIPTION, epilog=EPILOG, formatter_class=HelpLayout)
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     parser.set_defaults(command=print_help(parser))
     commands = parser.add_subparsers(metavar="COMMAND", title="commands")
@@ -79,6 +79,13 @@ def make_parser() -> argparse.ArgumentParser:
     add_sweep_command(commands)
     add_exchange_commands(commands)
     return parser
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors take a line, whatever the argument held; those of the commands are made of it, too."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(one_line(message))
 
 
 class _Version(argparse.Action):

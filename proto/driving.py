@@ -95,7 +95,12 @@ def command_of(message: pb.Command) -> Command:
         state = DrivingState(message.state)
     except (KeyError, ValueError):
         raise HippodromeError(f"it sent indicator {message.indicator} and state {message.state}, which are unknown") from None
-    return Command(*numbers, indicator, state, message.reason[:MOST_REASON], message.reverse)
+    return Command(*numbers, indicator, state, _printable(message.reason[:MOST_REASON]), message.reverse)
+
+
+def _printable(text: str) -> str:
+    """Text that cannot command a terminal: it is a stranger's, and shown in the progress, the page and films."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def lane_messages(roads: RoadNetwork) -> Iterator[pb.Lane]:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.roads.network import BoolArray, RoadNetwork
 from hippodrome.core.se2 import wrap
-from hippodrome.core.types import FloatArray
+from hippodrome.core.types import FloatArray, UInt8Array
 from hippodrome.sim.ego_spec import LENGTH_M, REAR_AXLE_TO_FRONT_M, WHEELBASE_M, EgoSpec
 from hippodrome.sim.lane_log import driven_edges, lane_pieces
 from hippodrome.sim.net_heights import heights_along_m, pitch_rad
@@ -19,15 +19,20 @@ from hippodrome.sim.pilot import DriveLog, Pilot
 from hippodrome.sim.sumo_run import SUMO_STEP_S, BackgroundTraffic, sumo_run
 from hippodrome.sim.tour import TourGraph, coverage_and_revisits, tour_graph, toured_area
 from hippodrome.sim.tour_spec import TourSpec
-from hippodrome.sim.traffic import vehicle_types_xml
+from hippodrome.sim.traffic import VEHICLE_SIZES_M, vehicle_types_xml
 from hippodrome.sim.traffic_spec import TrafficSpec
-from hippodrome.sim.types import Drive, Town
+from hippodrome.sim.types import Drive, Town, TrafficLog
 
 if TYPE_CHECKING:
     from hippodrome.sim.ego import Track
 
 DRIVE_STEP_S: Final = 0.05  # of the ego's car; two steps to one of SUMO's
 ROAM_PER_VEHICLE_M: Final = 200.0  # traffic uses the tour's area and as much around it as keeps queues at signals short
+CLEAR_AFTER_STEPS: Final = 20  # of SUMO: two seconds, within which one that turns has gone by
+TOUCHING_M: Final = 0.4  # boxes that overlap by less touch: the car's motion is not SUMO's to the last decimetre
+SAME_ROAD_M: Final = 2.0  # of height between vehicles on one road; bridges are higher
+SAMPLES: Final = round(SUMO_STEP_S / DRIVE_STEP_S)  # of the drive to a step of SUMO
+WIDTH_M: Final = 1.8  # of the ego
 NEARBY_M: Final = 15.0  # the pose's projection on its lane lies within this of where the path says
 
 
@@ -71,11 +76,60 @@ def _as_drive(town: Town, graph: TourGraph, log: DriveLog, ego: EgoSpec, rng: np
         yaw_rate_radps=track.yaw_rate_radps,
         lane=lane,
         lane_position_m=position_m,
-        traffic=log.traffic(),
+        traffic=clear_at_start(log.traffic(), track.poses_m[::SAMPLES], None if heights_m is None else heights_m[::SAMPLES]),
         coverage=coverage,
         revisit_share=revisit_share,
         heights_m=heights_m,
     )
+
+
+def clear_at_start(log: TrafficLog, poses_m: FloatArray, heights_m: FloatArray | None = None) -> TrafficLog:
+    """The traffic without those who are inside the ego when it begins, until they have left it.
+
+    SUMO sets the ego down on a lane in which the rear of one that turns across it still stands: it knows no vehicle's outline.
+
+    Args:
+        log: SUMO's steps.
+        poses_m: poses (n, 3) of the ego's rear axle at each of them.
+        heights_m: its heights (n,), where roads climb: who passes above or below it is not inside.
+    """
+    left_out = np.zeros(len(log.vehicle), dtype=bool)
+    inside = None
+    for step in range(min(CLEAR_AFTER_STEPS, len(log.t_s), len(poses_m))):
+        rows = np.arange(log.start[step], log.start[step + 1])
+        within = _are_inside(poses_m[step], log.poses_m[rows], log.kind[rows])
+        if heights_m is not None and len(rows):
+            within &= np.abs(log.poses_m[rows, 3] - heights_m[step]) < SAME_ROAD_M
+        hit = rows[within]
+        inside = set(log.vehicle[hit]) if inside is None else inside & set(log.vehicle[hit])
+        if not inside:
+            break
+        left_out[rows[np.isin(log.vehicle[rows], list(inside))]] = True
+    if not left_out.any():
+        return log
+    gone = np.concatenate([[0], np.cumsum(left_out)])
+    kept = ~left_out
+    start = (log.start - gone[log.start]).astype(log.start.dtype)
+    return TrafficLog(log.t_s, start, log.vehicle[kept], log.poses_m[kept], log.kind[kept])
+
+
+def _are_inside(pose_m: FloatArray, others_m: FloatArray, kind: UInt8Array) -> BoolArray:
+    """Which vehicles (k,) overlap the ego, seen from above: no side of either box, made a little smaller, parts them."""
+    ahead = REAR_AXLE_TO_FRONT_M - 0.5 * LENGTH_M
+    middle = pose_m[:2] + ahead * np.array([np.cos(pose_m[2]), np.sin(pose_m[2])])
+    apart = others_m[:, :2] - middle
+    half = 0.5 * (VEHICLE_SIZES_M[kind, :2] - TOUCHING_M)
+    own = 0.5 * (np.array([LENGTH_M, WIDTH_M]) - TOUCHING_M)
+    turn = others_m[:, 2] - pose_m[2]
+    cos, sin = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    inside: BoolArray = np.ones(len(others_m), dtype=bool)
+    for heading, size, other in ((np.full(len(turn), pose_m[2]), np.tile(own, (len(turn), 1)), half),
+                                 (others_m[:, 2], half, np.tile(own, (len(turn), 1)))):  # fmt: skip
+        along = apart[:, 0] * np.cos(heading) + apart[:, 1] * np.sin(heading)
+        across = apart[:, 1] * np.cos(heading) - apart[:, 0] * np.sin(heading)
+        inside &= np.abs(along) < size[:, 0] + other[:, 0] * cos + other[:, 1] * sin
+        inside &= np.abs(across) < size[:, 1] + other[:, 0] * sin + other[:, 1] * cos
+    return inside
 
 
 def drive_pitch_rad(poses_m: FloatArray, heights_m: FloatArray) -> FloatArray:

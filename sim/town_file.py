@@ -47,7 +47,7 @@ def kept_town(net_file: Path, folder: Path, read: Callable[[], Town]) -> Town:
         town = _from_file(path, net_file)
         if town is None:
             town = read()
-            write_arrays(path, _arrays(town))
+            write_arrays(path, _arrays(town, path.name))
     return town
 
 
@@ -63,18 +63,29 @@ def _one_at_a_time(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
-def _arrays(town: Town) -> dict[str, Any]:
-    """A town as arrays of numbers; its words are JSON."""
+def _arrays(town: Town, file_name: str) -> dict[str, Any]:
+    """A town as arrays of numbers; its words are JSON, and hold the name of the file, which says what the town was made of."""
     network = town.network
-    words = {"name": town.name, "notes": town.notes, "left_hand": town.left_hand, "rural": town.rural,
+    words: dict[str, Any] = {"name": town.name, "notes": town.notes, "left_hand": town.left_hand, "rural": town.rural,
              "lane_ids": network.lane_ids, "edge_ids": network.edge_ids}  # fmt: skip
-    arrays: dict[str, Any] = {"words": np.frombuffer(json.dumps(words).encode(), dtype=np.uint8), "signals_m": town.signals_m}
+    arrays: dict[str, Any] = {"signals_m": town.signals_m}
     arrays |= {f"network_{name}": np.asarray(getattr(network, name)) for name in NUMBERS}
     for name in OUTLINES:
         arrays |= _joined(name, getattr(town, name), (0, 2))
     if town.heights_m is not None and town.junction_heights_m is not None:
         arrays |= {"heights_m": town.heights_m, **_joined("junction_heights_m", town.junction_heights_m, (0,))}
-    return arrays
+    words |= {"file": file_name, "sha256": _digest(arrays)}
+    return arrays | {"words": np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)}
+
+
+def _digest(arrays: dict[str, Any]) -> str:
+    """A hash of all arrays but the words."""
+    digest = hashlib.sha256()
+    for name in sorted(arrays.keys() - {"words"}):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape} ".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
 def _from_file(path: Path, net_file: Path) -> Town | None:
@@ -84,6 +95,8 @@ def _from_file(path: Path, net_file: Path) -> Town | None:
     try:
         arrays = read_arrays(path, wanted, ["heights_m", "junction_heights_m", "junction_heights_m_ends"])
         words = json.loads(arrays["words"].tobytes())
+        if (words["file"], words["sha256"]) != (path.name, _digest(arrays)):
+            return None  # another network's, or changed
         numbers: dict[str, Any] = {name: arrays[f"network_{name}"] for name in NUMBERS}
         numbers["survey_sigma_m"] = float(numbers["survey_sigma_m"])
         names: dict[str, Any] = {name: tuple(words[name]) for name in WORDS}

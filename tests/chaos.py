@@ -1,4 +1,4 @@
-"""Commands that are killed in the middle, and pairs of them in one folder: ``make chaos``.
+"""Commands that are killed or meet a fault of the machine, and pairs of them in one folder: ``make chaos``.
 
 Each kill has a number, which with the seed says what is hit, by which signal and when. The same command then runs once more: it
 has to end well, with the same results as a run that nobody disturbed, and nothing may be left: no process after ``ORPHAN_S``, no
@@ -8,7 +8,6 @@ temporary folder, no unfinished file.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import re
 import signal
@@ -17,6 +16,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -24,6 +24,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.same.folders import compare_folders
+from tests.families import command_line, kill, session, started_with, with_default_signals
 
 SCENARIO: Final = """\
 name: tiny
@@ -41,10 +42,29 @@ SIGNALS: Final = ("SIGTERM", "SIGHUP", "SIGINT", "SIGKILL")
 COMMANDS: Final = {
     "baselines": ("baselines", "--seconds", "20", "--runs", "1"),
     "cell": ("sweep", "--set", "localizer.mode=coupled"),  # the cheapest, for the suite
+    "drive": (
+        "drive",
+        "--missions",
+        "1",
+        "--rows",
+        "truth",
+        "--film",
+        "--policy",
+        "brief_driver:Brief",
+    ),  # it ends with 1: a false arrival
     "eval": ("eval",),
     "sweep": ("sweep", "--set", "localizer.mode=coupled,kalman"),
 }
-USUAL: Final = ("eval", "sweep")  # of a campaign; a share of its kills hits ``baselines`` where ORB-SLAM3 is installed
+POLICY: Final = """\
+from hippodrome.core.navigation.types import Command, DrivingState
+class Brief:  # it drives off, stops, and says that it has arrived: a false arrival
+    steps = 0
+    def step(self, observation, radar):
+        self.steps += 1
+        braking = self.steps > 20
+        return Command(-3.0 if braking else 1.0, 0.0, state=DrivingState.ARRIVED if braking else DrivingState.DRIVING)
+"""
+USUAL: Final = ("eval", "sweep", "drive")  # of a campaign; a share of its kills hits ``baselines`` where ORB-SLAM3 is installed
 # A cluster as docs/sweeps.md sets it up, in one process: its address, then the numbers of its workers.
 CLUSTER: Final = """
 import distributed, sys, time
@@ -55,7 +75,10 @@ if __name__ == "__main__":
         sys.stdin.read()
 """
 # Progress without a terminal, and what Python says when it cleans up after a killed main process.
-EXPECTED_LINE = re.compile(r"^[\w -]+: (\d+ of \d+ done, \d+ s|nothing to do)(; next: \w+)?$|resource_tracker")
+EXPECTED_LINE = re.compile(
+    r"^[\w -]+: (\d+ of \d+ done, \d+ s|nothing to do)(; next: \w+)?$|resource_tracker|"
+    r"^tiny .* mission \d+: |^\d+ missions in \d+ towns; those that are done are kept$"
+)
 
 
 @dataclass(frozen=True)
@@ -87,17 +110,21 @@ class Chaos:
         self.folder = folder
         self.scenario = folder / "tiny.yaml"
         self.scenario.write_text(SCENARIO)
+        (folder / "brief_driver.py").write_text(POLICY)
         self.temporary = folder / "tmp"
         self.temporary.mkdir()
         self.took_s: dict[str, float] = {}
+        self.status: dict[str, int | None] = {}  # of undisturbed commands
 
-    def start(self, command: str, out: Path, *more: str) -> subprocess.Popen[str]:
-        """A command in a session of its own, with a folder of its own for temporary files."""
+    def start(self, command: str, out: Path, *more: str, within: Sequence[str] = ()) -> subprocess.Popen[str]:
+        """A command in a session of its own, with a folder of its own for temporary files; ``within``: words that run it."""
         usual = ("--workers", "1" if command == "cell" else "2")
         words = [*COMMANDS[command], str(self.scenario), *(more or usual), "--out", str(out)]
-        environment = {**os.environ, "TMPDIR": str(self.temporary)}
-        return subprocess.Popen([sys.executable, "-m", "hippodrome.eval.cli", *words], env=environment, start_new_session=True,
-                                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)  # fmt: skip
+        path = os.pathsep.join([str(self.folder), *filter(None, [os.environ.get("PYTHONPATH")])])
+        environment = {**os.environ, "TMPDIR": str(self.temporary), "PYTHONPATH": path}
+        words = [*within, sys.executable, "-m", "hippodrome.eval.cli", *words]
+        return subprocess.Popen(words, env=environment, start_new_session=True, stdout=subprocess.DEVNULL,
+                                stderr=subprocess.PIPE, text=True, preexec_fn=with_default_signals)  # fmt: skip
 
     def undisturbed(self, command: str) -> Path:
         """The results of a run that nobody disturbs; made once."""
@@ -105,7 +132,8 @@ class Chaos:
         if command not in self.took_s:
             began = time.monotonic()
             status, said = self.ended(self.start(command, out), SLOWER * LONGEST_S)
-            assert status == 0, said
+            assert status == 0 or (status == 1 and command == "drive"), said
+            self.status[command] = status
             self.took_s[command] = time.monotonic() - began
         return out
 
@@ -130,9 +158,9 @@ class Chaos:
             while time.monotonic() - began < attempt.share * self.took_s[attempt.command] and process.poll() is None:
                 time.sleep(0.02)
             _hit(process, attempt)
-            faults = self._faults_of_end(process, attempt)
+            faults = self.faults_of_end(process, (*ENDS[attempt.target], self.status[attempt.command]))
         status, said = self.ended(self.start(attempt.command, out))
-        return faults + self._faults_of_rerun(status, said, whole, out)
+        return faults + self.faults_of_rerun(status, said, whole, out, self.status[attempt.command])
 
     def pair(self, name: str, command: str, delay_s: float) -> list[str]:
         """Two runs of a command in one folder, and a third when both have ended; what was wrong."""
@@ -143,10 +171,10 @@ class Chaos:
         faults = [f"traceback: {said[-300:]}" for status, said in ends if "Traceback" in said or status == 70]
         faults += ["hang: one of a pair" for status, _ in ends if status is None]
         refused = [said for status, said in ends if status == 2 and "another hippodrome command is writing there" in said]
-        if len(refused) + sum(status == 0 for status, _ in ends) != 2 or len(refused) == 2:
+        if len(refused) + sum(status == self.status[command] for status, _ in ends) != 2 or len(refused) == 2:
             faults.append(f"ended: a pair with {[status for status, _ in ends]}: {' / '.join(said[-200:] for _, said in ends)}")
         status, said = self.ended(self.start(command, out))
-        return faults + self._faults_of_rerun(status, said, whole, out)
+        return faults + self.faults_of_rerun(status, said, whole, out, self.status[command])
 
     def _without_a_dask_worker(self, attempt: Attempt, out: Path) -> list[str]:
         """Kill one of two workers of a cluster; it starts another one, and the sweep goes on."""
@@ -158,28 +186,29 @@ class Chaos:
             address, *pids = cluster.stdout.readline().split()
             process = self.start(attempt.command, out, "--scheduler", address)
             time.sleep(attempt.share * self.took_s[attempt.command])
-            _kill(int(pids[0]), attempt.number)
+            kill(int(pids[0]), attempt.number)
             status, said = self.ended(process)
             cluster.communicate("")
         return [] if status == 0 else [f"ended: a sweep that lost a worker with {status}: {said[-300:]}"]
 
-    def _faults_of_end(self, process: subprocess.Popen[str], attempt: Attempt) -> list[str]:
+    def faults_of_end(self, process: subprocess.Popen[str], ends: tuple[int | None, ...]) -> list[str]:
+        """What is wrong with the end of a command that was disturbed; ``ends``: statuses that it may have beside 0."""
         status, said = self.ended(process)
-        faults = [] if status in (0, *ENDS[attempt.target]) else [f"ended: status {status}: {said[-300:]}"]
-        if status is None:
-            faults = ["hang: the command that was hit"]
+        how = "hang: the command that was hit" if status is None else f"ended: status {status}: {said[-300:]}"
+        faults = [] if status in (0, *ends) else [how]
         lines = [line for line in said.strip().splitlines() if not EXPECTED_LINE.search(line)]
         if "Traceback" in said or (status not in (0, 1) and len(lines) > 1):
             faults.append(f"traceback: {said[-400:]}")
         end_s = time.monotonic() + ORPHAN_S
-        while (left := session(process.pid)) and time.monotonic() < end_s:
+        while (left := session(process.pid) + started_with(f"TMPDIR={self.temporary}")) and time.monotonic() < end_s:
             time.sleep(0.05)
         for pid in left:
-            _kill(pid, "SIGKILL")
+            kill(pid, "SIGKILL")
         return faults + ([f"orphan: {len(left)} processes after {ORPHAN_S:g} s"] if left else [])
 
-    def _faults_of_rerun(self, status: int | None, said: str, whole: Path, out: Path) -> list[str]:
-        if status != 0:
+    def faults_of_rerun(self, status: int | None, said: str, whole: Path, out: Path, expected: int | None = 0) -> list[str]:
+        """What is wrong with a rerun in ``out``, of which ``whole`` has the undisturbed results."""
+        if status != expected:
             return [f"{'hang' if status is None else 'ended'}: the rerun with {status}: {said[-400:]}"]
         tallies = compare_folders(whole, out)
         differing = {kind: tally for kind, tally in tallies.items() if tally.differing}
@@ -190,45 +219,22 @@ class Chaos:
         return faults + [f"changed: {name} is lost" for name in sorted(lost)[:3]] + [f"leftover: {name}" for name in left[:3]]
 
 
-def session(leader: int) -> list[int]:
-    """The processes of a session that are neither dead nor only waiting to be noticed."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            state, _, _, number = path.read_text().rpartition(")")[2].split()[:4]
-        except OSError:
-            continue
-        if int(number) == leader and state not in "ZX":
-            found.append(int(path.parent.name))
-    return found
-
-
 def _hit(process: subprocess.Popen[str], attempt: Attempt) -> None:
     """Send the signal to the main process, one worker, or all processes of the command."""
     pids = {"main": [process.pid], "all": session(process.pid)}.get(attempt.target)
     if pids is None:
-        workers = [pid for pid in session(process.pid) if pid != process.pid and b"spawn_main" in _command_line(pid)]
+        workers = [pid for pid in session(process.pid) if pid != process.pid and b"spawn_main" in command_line(pid)]
         pids = workers[:1]
     for pid in pids:
-        _kill(pid, attempt.number)
-
-
-def _command_line(pid: int) -> bytes:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return b""
-
-
-def _kill(pid: int, number: str) -> None:
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(pid, getattr(signal, number))
+        kill(pid, attempt.number)
 
 
 def campaign(
-    folder: Path, kills: int, pairs: int, seed: int, most_s: float, dask: bool, baselines: bool
+    folder: Path, kills: int, pairs: int, seed: int, most_s: float, dask: bool, baselines: bool, faults: int = 0
 ) -> list[tuple[str, list[str]]]:
     """What was done, and what was wrong each time; less where ``most_s`` are over before."""
+    from tests.machine_faults import fault_of, suffered
+
     chaos, found, end_s = Chaos(folder), list[tuple[str, list[str]]](), time.monotonic() + most_s
     rng = np.random.default_rng([seed, 1])
     plans = [(f"kill-{number}", attempt_of(seed, number, dask, baselines)) for number in range(kills)]
@@ -237,6 +243,13 @@ def campaign(
             return found
         what = f"{name}: {attempt.command}, {attempt.number} to {attempt.target} at {attempt.share:.0%}"
         found.append((what, chaos.killed(name, attempt)))
+        print(what, *found[-1][1] or ["ok"], sep="\n  ", flush=True)
+    for number in range(faults):
+        if time.monotonic() > end_s:
+            return found
+        fault = fault_of(seed, number)
+        what = f"fault-{number}: {fault.command}, {fault.kind} at {fault.share:.0%}"
+        found.append((what, suffered(chaos, f"fault-{number}", fault)))
         print(what, *found[-1][1] or ["ok"], sep="\n  ", flush=True)
     for number in range(pairs):
         if time.monotonic() > end_s:
@@ -249,9 +262,12 @@ def campaign(
 
 
 def _main() -> int:
+    from tests.machine_faults import can_mount
+
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=20, help="how many commands are killed (default: 20)")
     parser.add_argument("--pairs", type=int, default=4, help="how many pairs run in one folder (default: 4)")
+    parser.add_argument("--faults", type=int, default=5, help="how many runs meet a fault of the machine (default: 5)")
     parser.add_argument("--seed", type=int, default=0, help="of what is hit, by what, and when (default: 0)")
     parser.add_argument(
         "--baselines", action="store_true", help="hit the command that runs ORB-SLAM3, too; installs it if need be"
@@ -265,11 +281,13 @@ def _main() -> int:
     except ImportError:
         dask = False
         print("no kill of a Dask worker: pip install 'hippodrome[dask]'")
-    print(f"{options.kills} kills and {options.pairs} pairs, seed {options.seed}; limits: {LONGEST_S} s a command, "
-          f"{options.seconds:g} s in all", flush=True)  # fmt: skip
+    if not (mounts := can_mount()) and options.faults:
+        print("no fault of the machine: this system lets nobody but root mount a file system")
+    print(f"{options.kills} kills, {options.faults} faults of the machine and {options.pairs} pairs, seed {options.seed}; "
+          f"limits: {LONGEST_S} s a command, {options.seconds:g} s in all", flush=True)  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
         found = campaign(Path(folder), options.kills, options.pairs, options.seed, options.seconds, dask,
-                         options.baselines)  # fmt: skip
+                         options.baselines, options.faults if mounts else 0)  # fmt: skip
     counts = Counter(fault.partition(":")[0] for _, faults in found for fault in faults)
     kinds = {"traceback": "tracebacks", "hang": "hangs", "orphan": "with orphans", "leftover": "leftovers",
              "changed": "lost or changed", "ended": "ended otherwise"}  # fmt: skip

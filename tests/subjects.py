@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,13 +12,13 @@ from hippodrome._files import sha256_of
 from hippodrome.core import se2
 from hippodrome.eval.cli import main
 from hippodrome.eval.results.model import write_results
-from hippodrome.proto.codec import save_map
+from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.recording_checks import CHECKSUM, with_checksum
 from hippodrome.sim.sumo_tools import run_tool
 from tests.broken import Subject
 from tests.eval.exchange.subjects import COUNT, ODOMETRY, PNG, TUM
 from tests.eval.results.test_model import results
-from tests.proto.maps import random_map
+from tests.proto.maps import random_map, random_readings
 from tests.sim.test_map_import import BLOCK
 
 TINY = """\
@@ -27,6 +28,16 @@ town: {kind: grid, width_m: 150, height_m: 150, road_km: 1.2}
 camera: {rate_hz: 5, width: 80, height: 60, supersample: 1}
 mapping: {tour: {length_m: 450}, traffic: {vehicles: 2}}
 localization: {tour: {length_m: 200}, traffic: {vehicles: 2}}
+"""
+MISSIONS = """\
+missions:
+  count: 3
+  rows: [ours, truth]
+  policies: {mine: "json:loads", other: "exec:./driver --fast"}
+  answer_limit_s: 5.0
+thresholds:
+  drive: {row: truth, success_rate: 0.9, spl: 0.5, driving_score: 60, collisions_at_fault: 0, wrong_way: 0, false_arrivals: 0,
+          red_lights: 1, rights_of_way: 2, outside_lane_share: 0.02, time_ratio: 1.5}
 """
 XODR = """<OpenDRIVE>
 <header revMajor="1" revMinor="4" name="a" north="0" south="0" east="0" west="0"/>
@@ -106,6 +117,14 @@ def _map(folder):
     _quiet("map", folder / "rec", "--out", folder / "a.pbstream")
 
 
+def _map_read(folder):
+    """The map with what the camera read of the lane at each visit."""
+    _map(folder)
+    cognitive_map, provenance = load_map(folder / "a.pbstream")
+    read = random_readings(np.random.default_rng(4), len(cognitive_map.visits.t_s))
+    save_map(folder / "a.pbstream", replace(cognitive_map, visits=replace(cognitive_map.visits, lane=read)), provenance)
+
+
 def _refined(folder):
     _map(folder)
     _quiet("refine", folder / "a.pbstream", "--network", folder / "a.net.xml", "--mode", "paper", "--start", "4,-1.6,0",
@@ -162,6 +181,22 @@ def _yaml(folder):
     (folder / "a.yaml").write_text(TINY + "noise: harsh\nrefine: {mode: paper, route: {search: {bin_m: 5.0}}}\n")
 
 
+def _yaml_missions(folder):
+    (folder / "a.yaml").write_text(TINY + MISSIONS)
+
+
+def _driven(folder):
+    """A mission of the tiny town, driven and kept."""
+    (folder / "tiny.yaml").write_text(TINY)
+    _quiet("drive", folder / "tiny.yaml", "--missions", 1, "--rows", "truth", "--workers", 1, "--out", folder / "out")
+
+
+def _drive_on(folder, out):
+    shutil.copytree(folder / "out", out)
+    words = ["--missions", "1", "--rows", "truth", "--workers", "1", "--out", str(out)]
+    return ["drive", str(folder / "tiny.yaml"), *words]
+
+
 def _written(name, text):
     return lambda folder: (folder / name).write_text(text)
 
@@ -193,8 +228,12 @@ def _net_to_drive(folder):
 
 MORE = (
     Subject("yaml", _yaml, lambda folder, _: ["scenario", "validate", str(folder / "a.yaml")], lines=99),
+    Subject("yaml-missions", _yaml_missions, lambda folder, _: ["scenario", "validate", str(folder / "a.yaml")], lines=99),
+    Subject("drive-kept", _driven, _drive_on, "out/tiny/**/*.*", statuses=(0, 1, 2), lines=99,
+            longest_s=240, slow=True),
     Subject("map-refine", _map, _on("refine", "{0}/a.pbstream", "--network", "{0}/a.net.xml"), "a.pbstream"),
     Subject("map-paper", _map, _on("refine", "{0}/a.pbstream", "--network", "{0}/a.net.xml", *PAPER), "a.pbstream"),
+    Subject("map-read", _map_read, _on("refine", "{0}/a.pbstream", "--network", "{0}/a.net.xml", *PAPER), "a.pbstream"),
     Subject("map-score", _refined, lambda folder, _: ["score", str(folder / "b.pbstream"), str(folder / "rec")], "b.pbstream"),
     Subject("map-localize", _refined, _on("localize", "{0}/b.pbstream", "{0}/rec"), "b.pbstream"),
     Subject("map-random", lambda folder: (save_map(folder / "a.pbstream", random_map(), {}), net(folder)),

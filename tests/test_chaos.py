@@ -6,7 +6,9 @@ import time
 
 import pytest
 
-from tests.chaos import Attempt, Chaos, attempt_of, session
+from tests.chaos import Attempt, Chaos, attempt_of
+from tests.families import session
+from tests.machine_faults import KINDS, fault_of
 
 ENOUGH_S = 30.0  # a slow machine leaves the pair to ``make chaos``
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
@@ -28,13 +30,13 @@ def test_what_falls_is_told(tmp_path):
     for folder, text in ((whole, "{}"), (out, "{}")):
         (folder / "town").mkdir(parents=True)
         (folder / "town" / "map.json").write_text(text)
-    assert chaos._faults_of_rerun(0, "", whole, out) == []
+    assert chaos.faults_of_rerun(0, "", whole, out) == []
     (whole / "table1.md").write_text("")
     (out / "town" / ".a.json.abcdefgh.part").write_text("")
     (chaos.temporary / "hippodrome-x").mkdir()
-    faults = chaos._faults_of_rerun(0, "", whole, out)
+    faults = chaos.faults_of_rerun(0, "", whole, out)
     assert [one.partition(":")[0] for one in faults] == ["changed", "leftover", "leftover"]
-    assert chaos._faults_of_rerun(2, "no", whole, out)[0].startswith("ended") and session(signal.SIGKILL + 2**22) == []
+    assert chaos.faults_of_rerun(2, "no", whole, out)[0].startswith("ended") and session(signal.SIGKILL + 2**22) == []
 
 
 def test_attempts_are_those_of_the_seed():
@@ -42,5 +44,11 @@ def test_attempts_are_those_of_the_seed():
     assert attempts == [attempt_of(3, number, True) for number in range(60)]
     assert {one.target for one in attempts} == {"main", "worker", "all", "dask"}
     assert {one.number for one in attempts} == {"SIGTERM", "SIGHUP", "SIGINT", "SIGKILL"}
-    assert {one.command for one in attempts} == {"eval", "sweep"}
+    assert {one.command for one in attempts} == {"eval", "sweep", "drive"}
     assert "baselines" in {attempt_of(3, number, True, baselines=True).command for number in range(12)}
+
+
+def test_faults_are_those_of_the_seed():
+    faults = [fault_of(3, number) for number in range(20)]
+    assert faults == [fault_of(3, number) for number in range(20)] and {one.kind for one in faults} == set(KINDS)
+    assert len({(one.command, one.kind) for one in faults}) == 15

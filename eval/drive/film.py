@@ -6,6 +6,7 @@ Below them stand what the driver says, and the localizer's networks.
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
@@ -16,6 +17,7 @@ import numpy as np
 from PIL import Image
 
 from hippodrome._files import replacing
+from hippodrome._folders import temporary_folder
 from hippodrome.core.navigation.types import Command
 from hippodrome.core.types import FloatArray, Frame, HippodromeError, LocalizationEstimate
 from hippodrome.eval.drive.brain import PAPER, grid_sheet, head_ring
@@ -127,18 +129,33 @@ def _networks(estimate: LocalizationEstimate | None) -> list[tuple[str, Frame]]:
 
 
 def _write_mp4(file: Path, pictures: Sequence[Frame]) -> None:
+    """Write the film. OpenCV does not tell of a full disk, and goes by the name: its file lies in a temporary folder, is counted,
+    and copied. Raises HippodromeError where it is not whole."""
     height, width = pictures[0].shape[:2]
-    named = file.with_name(f"{file.name}.mp4")  # OpenCV goes by the name
-    writer = cv2.VideoWriter(str(named), cv2.VideoWriter.fourcc(*"mp4v"), 1000.0 / SHOWN_MS, (width, height))
+    with temporary_folder() as folder:
+        made = folder / "film.mp4"
+        writer = cv2.VideoWriter(str(made), cv2.VideoWriter.fourcc(*"mp4v"), 1000.0 / SHOWN_MS, (width, height))
+        try:
+            if not writer.isOpened():
+                raise HippodromeError(f"{file}: this OpenCV writes no MP4; use --film webp")
+            for picture in pictures:
+                writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
+        finally:
+            writer.release()
+        if (count := _pictures_in(made)) != len(pictures):
+            raise HippodromeError(
+                f"{folder}: {count} of {len(pictures)} pictures of an MP4 were written; free some space there, or set TMPDIR"
+            )
+        shutil.copyfile(made, file)
+
+
+def _pictures_in(film: Path) -> int:
+    """How many pictures a film says that it has; 0 for one that cannot be read."""
+    reader = cv2.VideoCapture(str(film))
     try:
-        if not writer.isOpened():
-            raise HippodromeError(f"{file}: this OpenCV writes no MP4; use --film webp")
-        for picture in pictures:
-            writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
+        return int(reader.get(cv2.CAP_PROP_FRAME_COUNT)) if reader.isOpened() else 0
     finally:
-        writer.release()
-        if named.exists():
-            named.replace(file)
+        reader.release()
 
 
 def _coloured(frame: Frame) -> Frame:

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from hippodrome._files import PACKAGE, code_sha256, read_bounded, replacing, write_atomically
+from hippodrome._files import PACKAGE, code_sha256, read_bounded, replacing, sha256_of, write_atomically
 from hippodrome.core.navigation.config import PlanConfig
 from hippodrome.core.navigation.routes import mapped_lanes
 from hippodrome.core.navigation.types import Goal
@@ -32,6 +32,7 @@ from hippodrome.sim.record import RecordingPlan, close_renderer
 from hippodrome.sim.scenario import Scenario
 
 MAX_MISSION_BYTES: Final = 1 << 20  # of a mission's file
+SEAL: Final = "sha256"  # key of a mission's file
 DRIVE_CODE: Final = ("eval/drive/*.py",)
 
 
@@ -78,7 +79,7 @@ def missions_of(scenario: Scenario, map_file: Path, out: Path, count: int) -> li
 def run_mission(task: MissionTask) -> dict[str, Any]:
     """The figures of a mission, from its file where it is done. Prints a line when it ends."""
     file = task.file()
-    if (kept := _kept(file)) is not None and (not task.film or task.film_file().exists()):
+    if (kept := _kept(file, task.trace_file())) is not None and (not task.film or task.film_file().exists()):
         return kept
     warm_up()
     close_renderer()  # that of the recordings: a process has one at a time
@@ -96,7 +97,7 @@ def run_mission(task: MissionTask) -> dict[str, Any]:
         np.savez_compressed(stream, columns=np.array(TRACE), trace=flight.trace.astype(np.float32))
     timed = {"figures": json.loads(to_json(figures)), "cpu_s": round(flight.cpu_s, 3)}
     if not flight.failure:  # one that failed is driven anew by the next command
-        write_atomically(file, to_json(timed, str(file)).encode())
+        write_atomically(file, to_json(timed | {SEAL: _seal(timed, task.trace_file())}, str(file)).encode())
     print(_line(task, figures), file=sys.stderr, flush=True)
     return timed
 
@@ -122,13 +123,20 @@ def _world(scenario: Scenario, out: Path) -> World:
     return World(scenario, out, closed=scenario.localization.closed)
 
 
-def _kept(file: Path) -> dict[str, Any] | None:
-    """What a finished mission left, if it is readable; a broken file is made anew."""
+def _kept(file: Path, trace_file: Path) -> dict[str, Any] | None:
+    """What a finished mission left, if it and its trace are as they were written; what is broken or lost is made anew."""
     try:
         kept = json.loads(read_bounded(file, MAX_MISSION_BYTES).decode())
-    except (OSError, ValueError, HippodromeError):
+        timed = {"figures": kept["figures"], "cpu_s": kept["cpu_s"]}
+        return timed if kept[SEAL] == _seal(timed, trace_file) else None
+    except (OSError, ValueError, LookupError, TypeError, RecursionError, HippodromeError):
         return None
-    return kept if isinstance(kept, dict) and isinstance(kept.get("figures"), dict) and "cpu_s" in kept else None
+
+
+def _seal(timed: dict[str, Any], trace_file: Path) -> str:
+    """A hash of a mission's figures and of its trace's file: what was cut, changed or swapped has another one."""
+    what = json.dumps([timed, sha256_of(trace_file)], sort_keys=True)
+    return hashlib.sha256(what.encode()).hexdigest()
 
 
 def _line(task: MissionTask, figures: dict[str, Any]) -> str:

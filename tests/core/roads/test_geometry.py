@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from shapely.geometry import LineString, Point
 
+from hippodrome.core.roads import geometry
 from hippodrome.core.roads.geometry import (
     chord_headings,
     entry_position_m,
@@ -48,6 +49,14 @@ def test_a_chord_cuts_the_corner_and_ends_with_the_lane():
     network = lanes_of([(0, 0), (10, 0), (10, 5)], [(50, 7), (50, 9)])
     headings = chord_headings(network, np.array([0, 0, 0]), np.array([0.0, 10.0, 15.0]), 2.0)
     assert headings == pytest.approx([0.0, 0.25 * np.pi, 0.5 * np.pi])
+
+
+def test_headings_do_not_depend_on_how_many_are_taken_together(monkeypatch):
+    lane = np.repeat(np.arange(GRID.lane_count), 7)
+    position = np.tile(np.linspace(0.0, 1.0, 7), GRID.lane_count) * GRID.lane_lengths_m()[lane]
+    whole = chord_headings(GRID, lane, position, 2.0)
+    monkeypatch.setattr(geometry, "_AT_ONCE", 5)
+    assert np.array_equal(chord_headings(GRID, lane, position, 2.0), whole)
 
 
 def test_positions_scale_with_the_length_of_the_lane_that_is_entered():

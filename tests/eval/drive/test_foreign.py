@@ -1,5 +1,7 @@
 """Policies of others: each kind of Python object and two clients drive, and whatever one does wrong has its cause told."""
 
+import contextlib
+import math
 import shutil
 import subprocess
 import sys
@@ -7,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from google.protobuf.message import DecodeError
 
 from hippodrome.core.navigation.types import Command, DrivingState, Goal, Indicator, Lamp, Radar
 from hippodrome.core.types import HippodromeError, Observation
@@ -25,6 +28,7 @@ from hippodrome.proto.driving import (
     radar_of,
 )
 from hippodrome.sim.render.camera import CameraSpec
+from tests.changes import BINARY, _float
 from tests.core.navigation.roads import ring
 from tests.eval.contest.test_streams import FRAMES
 from tests.proto.maps import assert_same, random_map
@@ -234,3 +238,23 @@ def test_what_is_sensed_and_commanded_survives_the_stream():
         command_of(pb.Command(state=9))
     network = ring()
     assert_same(network_of(list(lane_messages(network)), network.survey_sigma_m), network)
+
+
+def test_broken_commands_are_commands_or_refused():
+    """Garbage in a message is a command that the vehicle can be given, or a sentence."""
+    whole = command_message(Command(-1.5, 0.2, Indicator.LEFT, DrivingState.DRIVING, "brakes", True)).SerializeToString()
+    read = 0
+    for seed in range(1500):
+        rng = np.random.default_rng(seed)
+        kinds = (*BINARY, _float)
+        data = kinds[int(rng.integers(len(kinds)))](rng, whole)
+        with contextlib.suppress(DecodeError, HippodromeError):
+            command = command_of(pb.Command.FromString(data))
+            assert math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)
+            assert command.reason.isprintable() and len(command.reason) <= 200
+            read += 1
+    assert 100 < read < 1500
+
+
+def test_what_a_policy_says_cannot_command_the_terminal():
+    assert command_of(pb.Command(reason="\x1b[31mred\nline\u202e")).reason == " [31mred line "

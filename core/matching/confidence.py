@@ -14,7 +14,7 @@ from hippodrome.core.matching.segments import (
     significant_segments,
 )
 from hippodrome.core.roads.network import BoolArray
-from hippodrome.core.types import Edges, FloatArray, MatchBreak, MatchStatus, UInt8Array
+from hippodrome.core.types import Edges, Float32Array, FloatArray, MatchBreak, MatchStatus, UInt8Array
 
 
 def distant_gap(route: Route, config: ConfidenceConfig) -> FloatArray:
@@ -33,7 +33,7 @@ def distant_gap(route: Route, config: ConfidenceConfig) -> FloatArray:
     return gap
 
 
-def steady_nats(route: Route, config: ConfidenceConfig) -> FloatArray:
+def steady_nats(route: Route, config: ConfidenceConfig) -> FloatArray | Float32Array:
     """Score (rows,) of the best complete route through each alternative, where it is known whether this odometer jumps in scale.
 
     Most odometers never do. The search cannot know beforehand whether this one does; once its scale has held over the whole

@@ -101,7 +101,7 @@ def _refined(
         added_lateral_m = unknown_lane_sigma_m(line, arc_m, free)
         targets = RoadTargets(points, heading, curvature(line, arc_m), added_lateral_m, road_weight, along_sigma_m, map_error)
         if map_error is not None:
-            targets = replace(targets, bend_1pm=bend(line, arc_m, max(CAR_M, BEND_SIGMAS * map_error.sigma_m)))
+            targets = replace(targets, bend_1pm=signed_curvature(line, arc_m, max(CAR_M, BEND_SIGMAS * map_error.sigma_m)))
         for _ in range(config.inner_iterations):
             state, factor = gauss_newton_step(state, visits, closures, targets, noise, scale_step_variance)
         noise, scale_step_variance = estimate_noise(state, visits, closures, targets, noise, scale_step_variance, factor)
@@ -129,11 +129,11 @@ def prior_scale_step_variance(state: State, visits: Visits, noise: Noise) -> Flo
 
 def curvature(line: RouteLine, arc_m: FloatArray) -> FloatArray:
     """Absolute curvature (S,) of the line in 1/m at the arc lengths (S,), as roads hold a vehicle less tightly in bends."""
-    magnitude: FloatArray = np.abs(bend(line, arc_m, CAR_M))
+    magnitude: FloatArray = np.abs(signed_curvature(line, arc_m, CAR_M))
     return magnitude
 
 
-def bend(line: RouteLine, arc_m: FloatArray, half_m: float) -> FloatArray:
+def signed_curvature(line: RouteLine, arc_m: FloatArray, half_m: float) -> FloatArray:
     """Curvature (S,) of the line in 1/m at the arc lengths (S,), positive to the left.
 
     It is the change of heading from ``half_m`` behind to as far ahead, over that distance.

@@ -188,17 +188,27 @@ def print_drives(drives: list[RealDrive], networks: dict[str, RoadNetwork]) -> N
 
 
 def print_controls(drives: list[RealDrive], networks: dict[str, RoadNetwork]) -> None:
-    """The drives where they did not drive: those of which anything is vouched for, and how many there were."""
+    """The drives where they did not drive: what of each is vouched for, as it is found, and how many were vouched for at all."""
     count, wrong, longest = 0, 0, 0.0
     for drive in drives:
-        print(f"controls of {drive.name} ...", file=sys.stderr, flush=True)
         for words, offered, network in controls(drive, networks):
             began = time.process_time()
             share = accepted(offered, network)
-            longest, count, wrong = max(longest, time.process_time() - began), count + 1, wrong + (share > 0.0)
-            if share > 0.0:
-                print(f"{drive.name} {words}: {share:.1%} vouched for, though it did not drive there", flush=True)
+            seconds = time.process_time() - began
+            longest, count, wrong = max(longest, seconds), count + 1, wrong + (share > 0.0)
+            said = f"{share:.1%} vouched for, though it did not drive there" if share > 0.0 else "refused"
+            print(f"{count:3} {drive.name} {words}: {said}, {seconds:.1f} s of CPU", flush=True)
     print(f"\n{count} controls, {wrong} of them vouched for anywhere; the longest took {longest:.1f} s of CPU", flush=True)
+
+
+def until_vouched(drives: list[RealDrive], networks: dict[str, RoadNetwork]) -> FloatArray:
+    """Metres of each drive until a stretch of it is vouched for, printed as they are found."""
+    print(flush=True)
+    metres = []
+    for drive in drives:
+        metres.append(metres_until_vouched(drive.visits, networks[drive.sequence]))
+        print(f"{drive.name}: vouched for after {metres[-1]:.0f} m", flush=True)
+    return np.array(metres)
 
 
 def print_bounds(drive: RealDrive, network: RoadNetwork) -> None:
@@ -228,7 +238,7 @@ def main(arguments: list[str]) -> int:
     refined(drives[0], networks[drives[0].sequence])  # compiles, or loads, what is compiled
     print_drives(drives, networks)
     print_controls(drives, networks)
-    print_metres(np.array([metres_until_vouched(drive.visits, networks[drive.sequence]) for drive in drives]))
+    print_metres(until_vouched(drives, networks))
     for drive in drives:
         if drive.name == MONOCULAR:
             print_bounds(drive, networks[drive.sequence])

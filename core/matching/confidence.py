@@ -14,7 +14,7 @@ from hippodrome.core.matching.segments import (
     significant_segments,
 )
 from hippodrome.core.roads.network import BoolArray
-from hippodrome.core.types import Edges, FloatArray, MatchBreak, MatchStatus, UInt8Array
+from hippodrome.core.types import Edges, Float32Array, FloatArray, MatchBreak, MatchStatus, UInt8Array
 
 
 def distant_gap(route: Route, config: ConfidenceConfig) -> FloatArray:
@@ -22,21 +22,29 @@ def distant_gap(route: Route, config: ConfidenceConfig) -> FloatArray:
 
     The gap is between complete routes, so that evidence from before and after the sample counts. If the search kept no
     alternative at another place, the lead is at least the search's margin and is returned as inf.
-
-    Most odometers never jump in scale. The search cannot know beforehand whether this one does; once its scale has held over the
-    whole drive, a route that needs a jump where the best one needs none is less likely by ``steady_scale_nats``.
     """
     found = route.alternatives
     rows = np.diff(found.row_start)
     away = found.points_m - np.repeat(route.points_m, rows, axis=0).astype(np.float32)
-    distant = np.where(np.sum(away**2, axis=1) > config.distant_m**2, found.through_nats, -np.inf)
-    if np.ptp(route.log_scale) <= config.steady_scale:
-        jumped = np.abs(found.log_scale - np.repeat(route.log_scale, rows)) > config.steady_scale
-        distant = distant - config.steady_scale_nats * jumped
+    distant = np.where(np.sum(away**2, axis=1) > config.distant_m**2, steady_nats(route, config), -np.inf)
     best = np.max(found.through_nats[found.row_start[-2] :])  # the best route passes through every sample
     rival = np.maximum.reduceat(distant, found.row_start[:-1])
     gap: FloatArray = np.where(rival > -1e29, best - rival, np.inf)
     return gap
+
+
+def steady_nats(route: Route, config: ConfidenceConfig) -> FloatArray | Float32Array:
+    """Score (rows,) of the best complete route through each alternative, where it is known whether this odometer jumps in scale.
+
+    Most odometers never do. The search cannot know beforehand whether this one does; once its scale has held over the whole
+    drive, a route that needs a jump where the best one needs none is less likely by ``steady_scale_nats``.
+    """
+    found, nats = route.alternatives, route.alternatives.through_nats
+    if np.ptp(route.log_scale) > config.steady_scale:
+        return nats
+    jumped = np.abs(found.log_scale - np.repeat(route.log_scale, np.diff(found.row_start))) > config.steady_scale
+    steady: FloatArray = nats - config.steady_scale_nats * jumped
+    return steady
 
 
 def match_status(
@@ -111,6 +119,39 @@ def reject_uncertain(status: UInt8Array, covariance: FloatArray, config: Confide
     """
     uncertain = np.linalg.eigvalsh(covariance)[:, -1] > config.most_sigma_m**2
     return np.where(uncertain & (status == MatchStatus.MATCHED), MatchStatus.AMBIGUOUS, status).astype(np.uint8)
+
+
+def reject_doubtful(status: UInt8Array, route: Route, points_m: FloatArray, config: ConfidenceConfig) -> UInt8Array:
+    """Status (S,) of the visits, where matched visits that the search may well have put elsewhere are made ambiguous.
+
+    A covariance is that of a scale that changes little by little. One that jumps where nothing tells how far along the road the
+    vehicle is, on a long straight or before the first corner, errs by more. The search knows of jumps: its alternatives pass
+    there at other places, and the share of those farther than ``far_m`` from the refined place is the probability that it is
+    wrong.
+
+    Args:
+        status: (S,) MatchStatus of each visit.
+        route: the route that the search found, with its alternatives.
+        points_m: (S, 2) refined places of the visits on the map as it is drawn.
+        config: how far off a place is wrong, and how probable that may be.
+    """
+    track = route.track
+    refined = np.column_stack([np.interp(track.arc, track.visit_arc, points_m[:, axis]) for axis in (0, 1)])
+    doubtful = far_probability(route, refined, config)[track.visit_samples()] > config.most_far
+    return np.where(doubtful & (status == MatchStatus.MATCHED), MatchStatus.AMBIGUOUS, status).astype(np.uint8)
+
+
+def far_probability(route: Route, points_m: FloatArray, config: ConfidenceConfig) -> FloatArray:
+    """Probability (T,), at each sample, that the vehicle was farther than ``far_m`` from ``points_m`` (T, 2), by the search.
+
+    Each alternative stands for one cell of a lane and counts by the likelihood of the best complete route through it.
+    """
+    found = route.alternatives
+    likelihood = np.exp(steady_nats(route, config).astype(np.float64))
+    away = found.points_m - np.repeat(points_m, np.diff(found.row_start), axis=0)
+    far = likelihood * (np.sum(away**2, axis=1) > config.far_m**2)
+    probability: FloatArray = np.add.reduceat(far, found.row_start[:-1]) / np.add.reduceat(likelihood, found.row_start[:-1])
+    return probability
 
 
 CAUSES = {

@@ -22,3 +22,5 @@ class ConfidenceConfig:
     least_agreeing: float = 0.34  # share of them that must agree with it: 5 of 6 are false once in 600 times if 20 % are
     most_sigma_m: float = 3.0  # a vertex whose place is less certain is ambiguous: it may be 10 m off
     most_moved_m: float = 12.0  # a vertex that the refinement moves farther is ambiguous; a right search errs by up to 7 m
+    far_m: float = 10.0  # a vertex farther off than this is wrong
+    most_far: float = 0.2  # probability of that, by the search's alternatives, from which on a vertex is ambiguous

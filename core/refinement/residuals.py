@@ -42,6 +42,7 @@ class RoadTargets:
     along_sigma_m: float  # sigma along the lane; infinite: the keyframe is drawn to the line, not to a point of it
     map_error: MapErrorModel | None = None  # None: the map is taken as exact
     read: ReadTargets | None = None  # what the camera read of the road
+    bend_1pm: FloatArray | None = None  # (S,) by which the lane's heading changes along it; None: it is that of the point
 
 
 class Factors(NamedTuple):
@@ -115,11 +116,14 @@ def odometry_factors(state: State, visits: Visits, noise: Noise, scale_step_vari
 def road_factors(state: State, targets: RoadTargets, noise: Noise) -> UnaryFactors:
     """The road at each keyframe: across the lane and heading against the lane's (both Student-t), and along the lane.
 
-        r = (n . (p + e - q) / sigma_n,  warp(psi - theta) / sigma_theta,  t . (p + e - q) / sigma_t)
+        r = (n . (p + e - q) / sigma_n,  warp(psi - theta - kappa t . (p + e - q)) / sigma_theta,  t . (p + e - q) / sigma_t)
 
     e is the error of the map, 0 where the map is taken as exact. q and theta are the target's point and heading, t the lane's
     direction and n the one to its left. With an infinite sigma_t this is the distance from a line, not from a point: the
     projection's error along the road is then not passed on to the pose.
+
+    kappa is the bend of the lane. With it a vehicle may slide along a bend, and its turns tell where in the bend it is. Without
+    it (0) the heading of one point holds it back: an exact map is followed so.
     """
     cos, sin = np.cos(targets.heading_rad), np.sin(targets.heading_rad)
     off = state.drawn_points_m - targets.points_m
@@ -127,10 +131,15 @@ def road_factors(state: State, targets: RoadTargets, noise: Noise) -> UnaryFacto
     across = (-sin * off[:, 0] + cos * off[:, 1]) / lateral
     along = (cos * off[:, 0] + sin * off[:, 1]) / targets.along_sigma_m
     turned = wrap(state.poses[:, 2] - targets.heading_rad) / turned_sigma
+    if targets.bend_1pm is not None:
+        ahead_rad = targets.bend_1pm * (cos * off[:, 0] + sin * off[:, 1])
+        turned = wrap(state.poses[:, 2] - targets.heading_rad - ahead_rad) / turned_sigma
     residual = np.column_stack([across, turned, along])
     jacobian = np.zeros((len(off), 3, state.width))
     jacobian[:, 0, 0], jacobian[:, 0, 1] = -sin / lateral, cos / lateral
     jacobian[:, 1, 2] = 1.0 / turned_sigma
+    if targets.bend_1pm is not None:
+        jacobian[:, 1, :2] = -(targets.bend_1pm / turned_sigma)[:, None] * np.column_stack([cos, sin])
     jacobian[:, 2, 0], jacobian[:, 2, 1] = cos / targets.along_sigma_m, sin / targets.along_sigma_m
     jacobian[:, :, 4:] = jacobian[:, :, : state.width - 4]  # an error of the map moves the road as a pose would move the car
     weight = student_weight(residual**2, noise.road_inverse_freedom)

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hippodrome.core.matching.confidence import match_breaks, match_status, reject_displaced, reject_uncertain
+from hippodrome.core.matching.confidence import match_breaks, match_status, reject_displaced, reject_doubtful, reject_uncertain
 from hippodrome.core.matching.control import control_of
 from hippodrome.core.matching.lane_choice import choose_lanes, near_lane_changes, on_parallel_lanes
 from hippodrome.core.matching.route_line import RouteLine, route_line
@@ -65,6 +65,7 @@ def refine_route(
         log_scale, free = solution.state.log_scale, near_lane_changes(line, network)
         solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver, read)
     status = reject_displaced(status, route, solution.state.drawn_points_m, config.confidence)
+    status = reject_doubtful(status, route, solution.state.drawn_points_m, config.confidence)
     status = reject_uncertain(status, solution.assumed_covariance[:, :2, :2], config.confidence)
     return _refinement(cognitive_map, network, line, solution, status)
 

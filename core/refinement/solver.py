@@ -29,6 +29,9 @@ from hippodrome.core.types import Edges, FloatArray, Visits
 
 MOST_CG_STEPS = 100  # iterations of conjugate gradients; 10-30 are usual, and the next round makes up for a step cut short
 
+CAR_M = 4.0  # a car's length, over which a bend is seen at least
+BEND_SIGMAS = 4.0  # half the length over which a bend tells the place along it, in sigmas of the map: so far off it is drawn
+
 _HELD_SIGMAS_M = (1000.0, 30.0)  # sigmas along a line that leaves the place on it open: they tell little and keep the condition
 
 
@@ -103,10 +106,13 @@ def _refined(
         bend = curvature(line, arc_m)
         read = None if readings is None else readings.at(arc_m, bend, added_lateral_m, config.loose_m(number))
         targets = RoadTargets(points, heading, bend, added_lateral_m, road_weight, along_sigma_m, map_error, read)
+        if map_error is not None:
+            targets = replace(targets, bend_1pm=signed_curvature(line, arc_m, max(CAR_M, BEND_SIGMAS * map_error.sigma_m)))
         for _ in range(config.inner_iterations):
             state, factor = gauss_newton_step(state, visits, closures, targets, noise, scale_step_variance)
         noise, scale_step_variance = estimate_noise(state, visits, closures, targets, noise, scale_step_variance, factor)
-    factors = all_factors(state, visits, closures, targets, noise, scale_step_variance)
+    no_bends = replace(targets, bend_1pm=None)  # where a bend is drawn is good enough to be followed, but nothing to be sure of
+    factors = all_factors(state, visits, closures, no_bends, noise, scale_step_variance)
     covariance = assumed = posterior_covariance(state, factors, closures)
     shown_m = None
     if map_error is not None and config.survey_freedom is not None:
@@ -127,15 +133,21 @@ def prior_scale_step_variance(state: State, visits: Visits, noise: Noise) -> Flo
     return variance
 
 
-def curvature(line: RouteLine, arc_m: FloatArray, half_m: float = 4.0) -> FloatArray:
-    """Absolute curvature (S,) of the line in 1/m at the arc lengths (S,), as roads hold a vehicle less tightly in bends.
+def curvature(line: RouteLine, arc_m: FloatArray) -> FloatArray:
+    """Absolute curvature (S,) of the line in 1/m at the arc lengths (S,), as roads hold a vehicle less tightly in bends."""
+    magnitude: FloatArray = np.abs(signed_curvature(line, arc_m, CAR_M))
+    return magnitude
 
-    It is the change of heading from ``half_m`` (a car's length) behind to as far ahead, over that distance.
+
+def signed_curvature(line: RouteLine, arc_m: FloatArray, half_m: float) -> FloatArray:
+    """Curvature (S,) of the line in 1/m at the arc lengths (S,), positive to the left.
+
+    It is the change of heading from ``half_m`` behind to as far ahead, over that distance.
     """
     heading = np.unwrap(line.heading_rad)
     turned = np.interp(arc_m + half_m, line.arc_m, heading) - np.interp(arc_m - half_m, line.arc_m, heading)
-    magnitude: FloatArray = np.abs(turned) / (2.0 * half_m)
-    return magnitude
+    curved: FloatArray = turned / (2.0 * half_m)
+    return curved
 
 
 def gauss_newton_step(

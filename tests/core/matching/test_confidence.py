@@ -3,7 +3,15 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from hippodrome.core.matching.confidence import distant_gap, match_breaks, match_status, reject_displaced, reject_uncertain
+from hippodrome.core.matching.confidence import (
+    distant_gap,
+    far_probability,
+    match_breaks,
+    match_status,
+    reject_displaced,
+    reject_doubtful,
+    reject_uncertain,
+)
 from hippodrome.core.matching.config import ConfidenceConfig
 from hippodrome.core.matching.control import control_of
 from hippodrome.core.matching.search.config import RouteSearchConfig
@@ -36,6 +44,30 @@ def test_the_gap_is_to_the_best_distant_alternative():
 def test_a_jump_in_scale_costs_more_on_a_drive_that_has_none():
     assert gap([0.0, 0.1], alternatives(rival_log_scale=0.3)) == [3.0 + CONFIG.steady_scale_nats, np.inf]
     assert gap([0.0, 0.3], alternatives(rival_log_scale=0.3)) == [3.0, np.inf]
+
+
+def test_the_alternatives_tell_how_probably_a_place_is_far_off():
+    """Where nothing tells how far along a road the vehicle is, the alternatives are spread along it."""
+    points = np.array([[0.0, 0.0], [12.0, 0.0], [-50.0, 0.0], [0.0, 0.0], [8.0, 0.0]], dtype=np.float32)
+    nats = np.log([1.0, 0.5, 0.5, 1.0, 1.0]).astype(np.float32)
+    track = Track(np.array([0.0, 5.0]), np.zeros(2), np.array([0.0, 5.0]), 5.0)
+    jumped = np.array([0.0, 0.0, 0.3, 0.0, 0.0])
+
+    def found(log_scale):
+        return SimpleNamespace(
+            track=track, log_scale=np.array(log_scale), alternatives=RouteAlternatives(rows, points, nats, jumped)
+        )
+
+    rows, places, status = np.array([0, 3, 5]), np.zeros((2, 2)), np.full(2, MatchStatus.MATCHED, dtype=np.uint8)
+    np.testing.assert_allclose(far_probability(found([0.0, 0.3]), places, CONFIG), [0.5, 0.0], atol=1e-6)
+    steady = far_probability(found([0.0, 0.0]), places, CONFIG)[0]  # this odometer's scale does not jump
+    np.testing.assert_allclose(steady, 1.0 / 3.0, atol=1e-3)
+    doubted = reject_doubtful(status, found([0.0, 0.3]), places, CONFIG)
+    assert doubted.tolist() == [MatchStatus.AMBIGUOUS, MatchStatus.MATCHED]
+    moved = np.array([[9.0, 0.0], [9.0, 0.0]])  # the refinement found it between both: only the third is far off
+    assert reject_doubtful(status, found([0.0, 0.0]), moved, CONFIG).tolist() == status.tolist()
+    off = np.full(2, MatchStatus.OFF_NETWORK, dtype=np.uint8)
+    assert reject_doubtful(off, found([0.0, 0.3]), places, CONFIG).tolist() == off.tolist()
 
 
 def test_each_status_has_its_reason():

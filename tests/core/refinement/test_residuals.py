@@ -102,6 +102,20 @@ def test_jacobians_agree_with_differences(problem):
     np.testing.assert_allclose(by_closure[0, :, :3], closing.source[0, :, :3], atol=1e-4)
 
 
+@pytest.mark.parametrize("to_a_point", [False, True])
+def test_a_vehicle_may_slide_along_a_bend_and_is_held_back_by_the_heading_of_one_point(problem, to_a_point):
+    """It is 2 m off its target along a bend of 0.02 rad/m, with the heading that the road has there."""
+    _, _, targets, state = problem
+    bends = replace(targets, bend_1pm=None if to_a_point else np.full(COUNT, 0.02), along_sigma_m=1e9)
+    tangent = np.column_stack([np.cos(targets.heading_rad), np.sin(targets.heading_rad)])
+    slid = np.column_stack([targets.points_m + 2.0 * tangent, targets.heading_rad + 0.04])
+    turned = road_factors(replace(state, poses=slid), bends, Noise()).residual[:, 1]
+    assert np.all(np.abs(turned) > 0.5) if to_a_point else np.allclose(turned, 0.0, atol=1e-9)
+    quiet = Noise(lateral_m=50.0, lane_heading_rad=50.0)
+    by_road = numeric(lambda s: road_factors(s, bends, quiet), state, 7)
+    np.testing.assert_allclose(by_road[7], road_factors(state, bends, quiet).jacobian[7], atol=1e-6)
+
+
 MODEL = MapErrorModel(sigma_m=2.0, length_m=50.0)
 
 

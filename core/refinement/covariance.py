@@ -27,8 +27,7 @@ def posterior_covariance(state: State, factors: Factors, closures: Edges) -> Flo
     With J and K the closure's whitened Jacobians of its near and its far end, and P the far end's covariance without any closure,
     a closure informs its near end by J^T (1 + K P K^T)^-1 J. What several closures of one place have in common is neglected.
     """
-    silent = _with_closures(factors, lambda closing: replace(closing, source=0.0 * closing.source, target=0.0 * closing.target))
-    alone = marginals(factorise(normal_equations(state, silent, closures)))[0]
+    alone = _without_closures(state, factors, closures)
 
     def loosened(closing: BinaryFactors) -> BinaryFactors:
         return replace(
@@ -38,6 +37,43 @@ def posterior_covariance(state: State, factors: Factors, closures: Edges) -> Flo
         )
 
     return marginals(factorise(normal_equations(state, _with_closures(factors, loosened), closures)))[0]
+
+
+def covariance_under_map_error(state: State, factors: Factors, closures: Edges) -> FloatArray:
+    """Covariance (S, 6, 6) of each keyframe's unknowns where the error of the map is among them; (S, 4, 4) without it.
+
+    Who comes by again meets the same error of the map, and learns nothing new of it. ``posterior_covariance`` takes the far end
+    of a closure as one more witness, which it is of a pose but not of that error: three passes would seem to halve it. So what
+    the error of the map adds to the poses is taken from the drive without closures, and what closures tell from an exact map:
+
+        P = P(closures, e = 0) + (P(no closures) - P(no closures, e = 0))
+
+    The second part is what is left of the error once odometry is known. It is never negative, as knowing e can only help.
+    """
+    if state.map_error_m is None:
+        return posterior_covariance(state, factors, closures)
+    exact_state, exact = _with_exact_map(state, factors)
+    alone = _without_closures(state, factors, closures)
+    poses = posterior_covariance(exact_state, exact, closures) - _without_closures(exact_state, exact, closures)
+    covariance = alone.copy()
+    covariance[:, :4, :4] += poses
+    return covariance
+
+
+def _with_exact_map(state: State, factors: Factors) -> tuple[State, Factors]:
+    """State and factors with the error of the map known to be what was found."""
+    road = replace(factors.road, jacobian=factors.road.jacobian[..., :4])
+    odometry, closing = (
+        replace(part, source=part.source[..., :4], target=part.target[..., :4]) for part in (factors.odometry, factors.closures)
+    )
+    read = None if factors.read is None else replace(factors.read, jacobian=factors.read.jacobian[..., :4])
+    return replace(state, map_error_m=None), Factors(odometry, road, closing, None, read)
+
+
+def _without_closures(state: State, factors: Factors, closures: Edges) -> FloatArray:
+    """Covariance (S, B, B) of each keyframe's unknowns by the chain alone."""
+    silent = _with_closures(factors, lambda closing: replace(closing, source=0.0 * closing.source, target=0.0 * closing.target))
+    return marginals(factorise(normal_equations(state, silent, closures)))[0]
 
 
 def _with_closures(factors: Factors, changed: Callable[[BinaryFactors], BinaryFactors]) -> Factors:

@@ -11,7 +11,7 @@ from hippodrome.core.matching.lane_choice import unknown_lane_sigma_m
 from hippodrome.core.matching.projection import reproject
 from hippodrome.core.matching.route_line import RouteLine
 from hippodrome.core.refinement.config import SolverConfig
-from hippodrome.core.refinement.covariance import posterior_covariance, with_systematic_errors
+from hippodrome.core.refinement.covariance import covariance_under_map_error, posterior_covariance, with_systematic_errors
 from hippodrome.core.refinement.factors import State
 from hippodrome.core.refinement.map_error import MapErrorModel, driven_m, map_error_factors, shown_sigma_m
 from hippodrome.core.refinement.noise import Noise, rescaled, variance_factors
@@ -113,12 +113,13 @@ def _refined(
         noise, scale_step_variance = estimate_noise(state, visits, closures, targets, noise, scale_step_variance, factor)
     no_bends = replace(targets, bend_1pm=None)  # where a bend is drawn is good enough to be followed, but nothing to be sure of
     factors = all_factors(state, visits, closures, no_bends, noise, scale_step_variance)
-    covariance = assumed = posterior_covariance(state, factors, closures)
+    assumed = posterior_covariance(state, factors, closures)
+    covariance = covariance_under_map_error(state, factors, closures) if map_error is not None else assumed
     shown_m = None
     if map_error is not None and config.survey_freedom is not None:
         shown_m = shown_sigma_m(map_error, config.survey_freedom, state, assumed, noise, visits)
         shown = map_error_factors(state, visits, closures, replace(map_error, sigma_m=shown_m))
-        covariance = posterior_covariance(state, factors._replace(map_error=shown), closures)
+        covariance = covariance_under_map_error(state, factors._replace(map_error=shown), closures)
     was_read = None if targets.read is None else np.isfinite(targets.read.across_sigma_m)
     told, as_assumed = (with_systematic_errors(one, was_read) for one in (covariance, assumed))
     return RouteSolution(state, arc_m, noise, told, as_assumed, shown_survey_sigma_m=shown_m)

@@ -69,13 +69,33 @@ class Guide:
         self._to_goal = False
         self._since_look_m, self._since_try_m, self._sure_m = 0.0, TRY_EVERY_M, 0.0
         self._off_road = 0
+        self._turned_round = False
+        self.places_given_up = 0  # that were followed
 
     @property
     def fix(self) -> Place | None:
         """The place, where it is sure."""
         return self.place if self._sure_m >= FIX_M else None
 
-    def step(self, distance_m: float, turned_rad: float, senses: Senses, told: FloatArray | None, searches: bool) -> None:
+    @property
+    def way_to_goal(self) -> tuple[Plan | None, FloatArray | None]:
+        """The way to the goal from the likeliest place and the pose there, where that is what is driven."""
+        return (self.plan, self.pose) if self._to_goal and self.plan is not None else (None, None)
+
+    def plan_anew(self) -> None:
+        """Look for another way at once: a road was closed."""
+        self.plan, self.agreed_m, self.guessed_m = None, 0.0, 0.0
+        self._since_try_m, self._since_look_m = TRY_EVERY_M, 1.0
+
+    def step(
+        self,
+        distance_m: float,
+        turned_rad: float,
+        senses: Senses,
+        told: FloatArray | None,
+        searches: bool,
+        turns_round: bool = False,
+    ) -> None:
         """Take a step in; only where the vehicle ``searches`` a way is looked for.
 
         Args:
@@ -84,7 +104,11 @@ class Guide:
             senses: what is sensed.
             told: (3,) the pose by the localizer, where it recognised a view.
             searches: whether the vehicle does.
+            turns_round: whether it is about to turn round in the street.
         """
+        if self._turned_round and not turns_round:
+            self.whereabouts.turn_round()
+        self._turned_round = turns_round
         self.whereabouts.step(distance_m, turned_rad, senses, senses.scale_sigma, told)
         if self.pose is not None:
             self.pose = moved(self.pose, distance_m, turned_rad)
@@ -128,6 +152,7 @@ class Guide:
         mine = self.whereabouts.near(self.pose)
         if mine.share < RIVAL * best.share:
             self.plan = self.pose = None
+            self.places_given_up += 1
             return
         off = mine.pose - self.pose
         off[2] = wrap(off[2])

@@ -52,6 +52,7 @@ NEAR_GOAL_M: Final = 25.0  # whoever is not sure of the place does not stop at t
 AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of the way, which must not lead off the road
 OFF_ROAD, OFF_ROAD_LOOKS = 0.15, 2
 FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 12.0  # a place so sure, for so long, is a fix
+VOUCHED: Final = 0.7  # share of the hypotheses that must be at the goal for an arrival to be said
 GUIDED_MPS: Final = 6.0
 REASON, GUESS = "drives where all likely places have a lane", "creeps where most likely places have a lane"
 
@@ -83,6 +84,10 @@ class Guide:
     def fix(self) -> Place | None:
         """The place, where it is sure."""
         return self.place if self._sure_m >= FIX_M else None
+
+    def vouches(self, pose: FloatArray) -> bool:
+        """Whether the hypotheses have the vehicle at a pose, too, and the ground there is as the network has it."""
+        return self.whereabouts.fits > FIX_FITS and self.whereabouts.near(pose).share > VOUCHED
 
     @property
     def way_to_goal(self) -> tuple[Plan | None, FloatArray | None]:

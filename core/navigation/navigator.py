@@ -241,7 +241,8 @@ class Navigator:
         assert self._belief.track is not None and self.estimate is not None
         drive = self._config.drive
         self._at_goal_s += dt_s
-        if self._belief.track.along_sigma_m < drive.goal_sigma_m and self._belief.since_fix_m > drive.settled_m:
+        is_known = self._belief.track.along_sigma_m < drive.goal_sigma_m and self._belief.since_fix_m > drive.settled_m
+        if is_known and (self._guide is None or self._guide.vouches(self._belief.track.pose)):
             self._arrived = True
             return self._standing(DrivingState.ARRIVED, "has arrived")
         if self._at_goal_s > ROUND_AGAIN_S:

@@ -17,6 +17,7 @@ SAME_WAY_RAD = math.radians(50.0)
 FARTHEST_M = 3.5  # a vehicle farther from every lane's middle is on none of them
 OPPOSITE_M = 8.0  # to the lane of the opposite direction: two lanes aside
 METRES_PER_RAD = 4.0  # what an angle to a lane counts against a distance from it
+SPEAKS = 0.5  # from which on borders tell of the oncoming lane: offsets alone do not, beside the road they would fit, too
 EDGE_M = 1.0  # what a border that is not as the network has it counts against a distance
 INTERNAL_M = 1.0  # by which ways through junctions count as farther away: they overlap, and roads are surer
 
@@ -80,9 +81,9 @@ def lane_that_is_read(
 ) -> LanePlace:
     """The lane that a reading speaks of: the one of the place, or one beside it that fits better, be it an oncoming one.
 
-    How well a lane fits is told by the place across it, and by which of its borders are edges of the road. An oncoming lane is
-    given as the vehicle sees it: with the vehicle's own direction, and the offset to the left of that. ``side`` is 1 where
-    traffic keeps left, -1 where it keeps right.
+    How well a lane fits is told by the place across it, and by which of its borders are edges of the road. An oncoming lane
+    counts where both borders that are seen are as its own. It is given as the vehicle sees it: with the vehicle's own direction,
+    and the offset to the left of that. ``side`` is 1 where traffic keeps left, -1 where it keeps right.
     """
     oncoming = oncoming_place(roads, pose)
     beyond = 0.0 if oncoming is None else -side
@@ -91,7 +92,7 @@ def lane_that_is_read(
         share = place.position_m / max(float(roads.lane_length_m[place.lane]), 1e-6)
         beside = place_beside(roads, pose, lane, share * float(roads.lane_length_m[lane]))
         candidates.append((beside, *_edges(roads, lane, beyond)))
-    if oncoming is not None:
+    if oncoming is not None and speaks_for_oncoming(roads, place, reading, side) > SPEAKS:
         right, left = _edges(roads, oncoming.lane, beyond)  # of the oncoming lane's own left and right
         candidates.append((oncoming, left, right))
 

@@ -32,7 +32,7 @@ def reading(offset_m, edges=OWN):
         (3.2, 0.0, ONCOMING, 1),
         (2.4, -0.7, ONCOMING, 1),
         (1.4, 1.5, OWN, 0),
-        (1.8, -1.4, (math.nan, math.nan), 1),
+        (1.8, -1.4, (math.nan, math.nan), 0),  # a pose that is wrong beside the road reads the same
     ],
 )
 def test_a_reading_in_a_wide_swing_is_of_the_oncoming_lane(aside_m, offset_m, edges, lane):

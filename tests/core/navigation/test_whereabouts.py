@@ -125,6 +125,9 @@ def test_what_tells_them_apart_gives_a_fix_at_the_right_place():
     guide, eyes = guide_on(network), Eyes(network)
     truth = drive(lambda d, t, eyes: guide.step(d, t, eyes, None, True), eyes, (20.0, 0.0, 0.0), [*LEFT[:2], (10.0, 0.0)])
     assert guide.fix is not None and np.hypot(*(guide.fix.pose - truth)[:2]) < 1.5
+    assert guide.vouches(truth) and not guide.vouches(truth + np.array([0.0, 300.0, 0.0]))
+    guide.whereabouts.fits = 0.8
+    assert not guide.vouches(truth)
 
 
 def test_a_recognised_view_decides_between_roads_that_are_alike():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,11 +12,12 @@ from hippodrome.core.navigation import track as tracks
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.course import at, offset_and_turn, path_poses
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced
-from hippodrome.core.navigation.placing import lane_that_is_read
+from hippodrome.core.navigation.placing import LanePlace, lane_that_is_read, oncoming_place, speaks_for_oncoming
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Indicator
 from hippodrome.core.navigation.whereabouts import Place, Whereabouts
+from hippodrome.core.reading.types import RoadReading
 from hippodrome.core.types import FloatArray, LocalizationEstimate, LocalizationStatus, Observation
 
 LOOK_EVERY_S = 0.4  # the localizer's pose is taken in so often: its looks are as frequent
@@ -30,6 +32,8 @@ AHEAD_M, HALF_BODY_M = (5.0, 13.0), 0.7  # of the path ahead, which must not lea
 OFF_ROAD, OFF_ROAD_FRAMES = 0.3, 3  # share of it that is seen to be no road, in so many frames: the place is wrong ..
 LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehicle may be so much farther on, or less far
 TRUSTED_SHIFT_M = 2.0  # smaller shifts are the ground's own error: borders are seen to half a metre, and always to one side
+ONCOMING_M = 8.0  # driven where the borders are those of the oncoming lane: then that is where the vehicle is
+READ_APART_M = 3.0  # of this way a reading may tell at most: between frames one drives less
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
 FOUND_EVERY_M, FOUND_REPEATS = 1.0, 2.0  # the place by the road network is taken in so often, and repeats its errors
@@ -58,7 +62,7 @@ class Belief:
         self._apart_looks = self._vouched = 0
         self._since_found_m = self._elsewhere_m = 0.0
         self._misfits = self._off_road = 0
-        self._on_map_m = 0.0
+        self._on_map_m = self._oncoming_m = self._since_read_m = 0.0
         self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
         self._refuted_m = 0.0
 
@@ -87,7 +91,7 @@ class Belief:
             return
         self._follow_network(found, distance_m)
         self._follow_localizer(estimate, distance_m, observation.dt_s, found, where)
-        self._correct_by_lane(observation, estimate, senses)
+        self._correct_by_lane(observation, estimate, senses, distance_m, where)
 
     def recognised_pose(self, estimate: LocalizationEstimate) -> FloatArray | None:
         """The localizer's pose, where it has just recognised a view."""
@@ -189,23 +193,35 @@ class Belief:
         self.since_fix_m = self._elsewhere_m = 0.0
         self._apart_looks = self._vouched = 0
 
-    def _correct_by_lane(self, observation: Observation, estimate: LocalizationEstimate, senses: Senses) -> None:
+    def _correct_by_lane(
+        self,
+        observation: Observation,
+        estimate: LocalizationEstimate,
+        senses: Senses,
+        distance_m: float,
+        where: Whereabouts | None,
+    ) -> None:
         """Correct the pose by the lane, where the vehicle is on one that is no way through a junction."""
         if self.track is None:
             return
         if self.plan is not None:
             self.plan = advanced(self.plan, self.track.pose)
         reading = senses.reading
+        self._since_read_m += distance_m
         if observation.frame is None or observation.speed <= 0.0 or self.turns_round:
             return
         self._check_by_sight(estimate, senses)
+        since_read_m, self._since_read_m = min(self._since_read_m, READ_APART_M), 0.0
         if reading is None or self.track is None:
             return
         place = self._planner.lane_place(self.plan, self.track.pose)
         network = self._planner.roads.network
         if place is None or network.is_internal[place.lane]:
             return
-        read = lane_that_is_read(self._planner.roads, self.track.pose, place, reading) if reading.sees_lane else place
+        read = lane_that_is_read(self._planner.roads, self.track.pose, place, reading, self._side) if reading.sees_lane else place
+        if self._is_on_oncoming(place, read, reading, since_read_m):
+            self._go_over(reading, estimate, where)
+            return
         left = np.array([-math.sin(read.heading_rad), math.cos(read.heading_rad)])
         point_m = self.track.pose[:2] - read.offset_m * left
         self.track, fits = tracks.with_lane(self.track, reading, point_m, read.heading_rad)
@@ -215,6 +231,30 @@ class Belief:
         if not len(network.successors(place.lane)) or network.is_internal[network.successors(place.lane)].any():
             to_end_m = float(self._planner.roads.lane_length_m[place.lane]) - place.position_m
             self.track, _ = tracks.with_end(self.track, reading, to_end_m, read.heading_rad)
+
+    def _is_on_oncoming(self, place: LanePlace, read: LanePlace, reading: RoadReading, since_m: float) -> bool:
+        """Whether the borders of the lane that is read have been those of the oncoming lane for long."""
+        if read.lane != place.lane:
+            self._oncoming_m = 0.0
+            return False
+        speaks = speaks_for_oncoming(self._planner.roads, place, reading, self._side)
+        self._oncoming_m = max(self._oncoming_m + speaks * since_m, 0.0)
+        return self._oncoming_m > ONCOMING_M
+
+    def _go_over(self, reading: RoadReading, estimate: LocalizationEstimate, where: Whereabouts | None) -> None:
+        """Take the pose and all hypotheses of it over to the oncoming lane: that is where the vehicle is."""
+        assert self.track is not None
+        self._oncoming_m = 0.0
+        oncoming = oncoming_place(self._planner.roads, self.track.pose)
+        if oncoming is None:
+            return
+        aside_m = reading.offset_m - oncoming.offset_m
+        left = np.array([-math.sin(oncoming.heading_rad), math.cos(oncoming.heading_rad)])
+        pose = np.array([*(self.track.pose[:2] + aside_m * left), self.track.pose[2]])
+        self.track, self.plan = tracks.loosened(replace(self.track, pose=pose), oncoming.heading_rad), None
+        self._refuted, self._refuted_m = tracks.begun(estimate.pose, estimate.covariance), 0.0
+        if where is not None:
+            where.move_aside(aside_m)
 
     def _check_by_sight(self, estimate: LocalizationEstimate, senses: Senses) -> None:
         """Compare the path with the ground: it must not lead off the road, and in a near turn the border tells the offset."""

@@ -16,17 +16,20 @@ import numpy as np
 
 from hippodrome.core import se2
 from hippodrome.core.navigation.agreement import WAY_STEP_M, LaneField, agreed_m, lane_field
+from hippodrome.core.navigation.border import OTHER, UNKNOWN
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.course import Course, make_course, path_poses, place_on
 from hippodrome.core.navigation.driving import pace
+from hippodrome.core.navigation.junctions import gate_speed_mps
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
 from hippodrome.core.navigation.placing import lane_of
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2, stopping_mps
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
 from hippodrome.core.navigation.types import Command, DrivingState, Radar
-from hippodrome.core.navigation.ways import drawn_on, way_poses, ways_ahead
+from hippodrome.core.navigation.ways import drawn_on, moved, strip, way_poses, ways_ahead
 from hippodrome.core.navigation.whereabouts import Place, Whereabouts
+from hippodrome.core.reading.types import LaneEnd, RoadReading
 from hippodrome.core.roads.paths import Piece
 from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray
@@ -37,6 +40,9 @@ LOOK_M: Final = 26.0  # of a way
 WAY_M: Final = 45.0  # of a way that is driven: another one is looked for before its end
 AGREED, GUESSED = 0.9, 0.6  # share of the poses that have a lane where the way is; with less, it is driven at a walk
 GUESSED_MPS: Final = 2.0
+GUESS_FITS: Final = 0.85  # where the ground fits worse, even what all places agree on is a guess
+SEEN_M, SEEN, NOT_ROAD = (2.0, 8.0), 0.7, 0.05  # of a guess: so much must have been seen, and hardly any of it be no road
+BEFORE_END_M: Final = 0.3  # the bumper stops so far before a stop line or a junction's mouth that is seen
 LEAST_M, SPARE_M = 5.0, 2.5  # of a way that is agreed on; and what is left over of it when the vehicle stops
 LIKELY: Final = 0.5  # share of a place from which the way to the goal is driven
 RIVAL: Final = 0.25  # the place that is followed is given up where another has four times its weight
@@ -46,6 +52,7 @@ NEAR_GOAL_M: Final = 25.0  # whoever is not sure of the place does not stop at t
 AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of the way, which must not lead off the road
 OFF_ROAD, OFF_ROAD_LOOKS = 0.15, 2
 FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 12.0  # a place so sure, for so long, is a fix
+VOUCHED: Final = 0.7  # share of the hypotheses that must be at the goal for an arrival to be said
 GUIDED_MPS: Final = 6.0
 REASON, GUESS = "drives where all likely places have a lane", "creeps where most likely places have a lane"
 
@@ -69,13 +76,38 @@ class Guide:
         self._to_goal = False
         self._since_look_m, self._since_try_m, self._sure_m = 0.0, TRY_EVERY_M, 0.0
         self._off_road = 0
+        self._turned_round = self._sees_road = False
+        self._end_m = math.inf  # to the end of the lane that was seen last
+        self.places_given_up = 0  # that were followed
 
     @property
     def fix(self) -> Place | None:
         """The place, where it is sure."""
         return self.place if self._sure_m >= FIX_M else None
 
-    def step(self, distance_m: float, turned_rad: float, senses: Senses, told: FloatArray | None, searches: bool) -> None:
+    def vouches(self, pose: FloatArray) -> bool:
+        """Whether the hypotheses have the vehicle at a pose, too, and the ground there is as the network has it."""
+        return self.whereabouts.fits > FIX_FITS and self.whereabouts.near(pose).share > VOUCHED
+
+    @property
+    def way_to_goal(self) -> tuple[Plan | None, FloatArray | None]:
+        """The way to the goal from the likeliest place and the pose there, where that is what is driven."""
+        return (self.plan, self.pose) if self._to_goal and self.plan is not None else (None, None)
+
+    def plan_anew(self) -> None:
+        """Look for another way at once: a road was closed."""
+        self.plan, self.agreed_m, self.guessed_m = None, 0.0, 0.0
+        self._since_try_m, self._since_look_m = TRY_EVERY_M, 1.0
+
+    def step(
+        self,
+        distance_m: float,
+        turned_rad: float,
+        senses: Senses,
+        told: FloatArray | None,
+        searches: bool,
+        turns_round: bool = False,
+    ) -> None:
         """Take a step in; only where the vehicle ``searches`` a way is looked for.
 
         Args:
@@ -84,12 +116,17 @@ class Guide:
             senses: what is sensed.
             told: (3,) the pose by the localizer, where it recognised a view.
             searches: whether the vehicle does.
+            turns_round: whether it is about to turn round in the street.
         """
+        if self._turned_round and not turns_round:
+            self.whereabouts.turn_round()
+        self._turned_round = turns_round
         self.whereabouts.step(distance_m, turned_rad, senses, senses.scale_sigma, told)
         if self.pose is not None:
             self.pose = moved(self.pose, distance_m, turned_rad)
         if self.place is not None:
             self.place = self.place.at(moved(self.place.pose, distance_m, turned_rad))
+        self._see_end(senses.reading, distance_m)
         self._since_look_m += abs(distance_m)
         self._since_try_m += abs(distance_m)
         if self._since_look_m >= 1.0:
@@ -120,6 +157,23 @@ class Guide:
         if (self.agreed_m < LEAST_M or ends or wants_goal) and self._since_try_m >= TRY_EVERY_M:
             self._since_try_m = 0.0
             self._try(best, poses, senses)
+        self._sees_road = self._is_seen(senses)
+
+    def _see_end(self, reading: RoadReading | None, distance_m: float) -> None:
+        """Remember the end of the lane that was seen."""
+        self._end_m -= distance_m
+        if reading is not None and reading.end is not LaneEnd.NOTHING and math.isfinite(reading.end_m):
+            self._end_m = reading.end_m
+        elif self._end_m < 0.0:
+            self._end_m = math.inf
+
+    def _is_seen(self, senses: Senses) -> bool:
+        """Whether the way right ahead has been seen, and to be road."""
+        if self.plan is None or self.pose is None:
+            return False
+        path = path_poses(self.plan.course, self.plan.u_m + SEEN_M[0], self.plan.u_m + SEEN_M[1])
+        kinds = senses.ground.kinds_at(strip(se2.between(self.pose, path), HALF_BODY_M))
+        return bool(np.mean(kinds != UNKNOWN) > SEEN and np.mean(kinds == OTHER) < NOT_ROAD)
 
     def _follow(self, best: Place) -> None:
         """Take the pose to the particles about it, or give it up for a place that is much likelier."""
@@ -128,6 +182,7 @@ class Guide:
         mine = self.whereabouts.near(self.pose)
         if mine.share < RIVAL * best.share:
             self.plan = self.pose = None
+            self.places_given_up += 1
             return
         off = mine.pose - self.pose
         off[2] = wrap(off[2])
@@ -148,9 +203,7 @@ class Guide:
         near = ahead[(ahead[:, 0] > AHEAD_M[0]) & (np.hypot(ahead[:, 0], ahead[:, 1]) < AHEAD_M[1])]
         if len(near) == 0:
             return False
-        left = np.stack([-np.sin(near[:, 2]), np.cos(near[:, 2])], axis=1)
-        points = np.concatenate([near[:, :2] + aside * left for aside in (-HALF_BODY_M, 0.0, HALF_BODY_M)])
-        return senses.ground.off_road_share(points) > OFF_ROAD
+        return senses.ground.off_road_share(strip(near, HALF_BODY_M)) > OFF_ROAD
 
     def _try(self, best: Place, poses: FloatArray, senses: Senses) -> None:
         """Look for a way that is agreed on for longer than the present one."""
@@ -216,25 +269,23 @@ class Guide:
         """What to do on the way that is agreed on; None where that is too short."""
         config = self._config
         left_m, most_mps, reason = self.agreed_m - self._since_look_m, GUIDED_MPS, REASON
-        if left_m < LEAST_M - 1.0:
-            left_m, most_mps, reason = self.guessed_m - self._since_look_m, GUESSED_MPS, GUESS
+        if left_m < LEAST_M - 1.0 or self.whereabouts.fits < GUESS_FITS:
+            left_m = max(left_m, self.guessed_m - self._since_look_m) if self._sees_road else 0.0
+            most_mps, reason = GUESSED_MPS, GUESS
         if self.plan is None or self.pose is None or left_m < LEAST_M - 1.0:
             return None
         step = pace(self.plan.course, self.plan.u_m, speed_mps, radar, 0.0, config.drive, config.vehicle)
         agreed_mps = max(stopping_mps(left_m - SPARE_M, config.drive.braking_mps2), config.drive.creep_mps)
-        wanted = min(step.speed_mps, most_mps, agreed_mps)
+        seen_m = self._end_m - config.vehicle.front_m - BEFORE_END_M
+        seen_mps, why = gate_speed_mps(seen_m, speed_mps, radar, config.drive)
+        wanted = min(step.speed_mps, most_mps, agreed_mps, seen_mps)
+        if wanted < min(most_mps, agreed_mps):
+            reason = (why if seen_mps <= step.speed_mps else step.reason) or reason
         accel = min(
             approach_mps2(speed_mps, wanted, config.drive), following_mps2(speed_mps, radar, config.drive, config.vehicle)
         )
-        accel = min(accel, stop_mps2(speed_mps, step.to_stop_m, config.drive, config.vehicle))
+        to_stop_m = min(step.to_stop_m, seen_m) if math.isfinite(seen_mps) else step.to_stop_m
+        accel = min(accel, stop_mps2(speed_mps, to_stop_m, config.drive, config.vehicle))
         bend = path_curvature_1pm(self.plan.course, self.plan.u_m, self.pose, speed_mps, config.drive)
         wheel = steering_rad(bend, speed_mps, config.drive, config.vehicle)
-        return Command(accel, wheel, step.indicator, DrivingState.SEARCHING, step.reason or reason)
-
-
-def moved(pose: FloatArray, distance_m: float, turned_rad: float) -> FloatArray:
-    """A pose after a short arc."""
-    chord = pose[2] + 0.5 * turned_rad
-    step = np.array([distance_m * math.cos(chord), distance_m * math.sin(chord), turned_rad])
-    after: FloatArray = pose + step
-    return after
+        return Command(accel, wheel, step.indicator, DrivingState.SEARCHING, reason)

@@ -22,6 +22,7 @@ UNLIKELY: Final = 2.0  # the most that one glance at the lane counts against a p
 FREE_ASIDE_M, ASIDE_M, TURN_RAD = 1.0, 1.0, 0.25  # off the lane's middle by less is usual; what is not has these deviations
 PER_M: Final = 0.15  # weight of keeping to the lane, per metre
 DEAD_END: Final = 3.0  # the price of a metre beyond the end of all lanes
+AGAINST_RAD: Final = 2.0  # against its lane a particle has turned round
 LATE_M: Final = 0.3  # beyond its border a particle changes to the lane beside it
 
 
@@ -111,6 +112,25 @@ def move(
         bent = row[TURN] / TURN_RAD
         row[WEIGHT] -= PER_M * abs(step) * (min(0.5 * far * far, UNLIKELY) + min(0.5 * bent * bent, UNLIKELY))
     return alive
+
+
+@njit(cache=True)
+def turn_round(
+    rows: FloatArray, segments: IntArray, count: int, segment_lane: IntArray, segment_start: IntArray, begin: FloatArray,
+    direction: FloatArray, length: FloatArray, position: FloatArray, opposite: IntArray, lane_length: FloatArray,
+) -> None:  # fmt: skip
+    """Take particles that have turned against their lanes to the lanes of the opposite direction, -1 where there is none."""
+    for i in range(count):
+        lane = segment_lane[segments[i]]
+        other = opposite[lane]
+        if abs(rows[i, TURN]) < AGAINST_RAD or other < 0:
+            continue
+        there = (1.0 - rows[i, ALONG] / max(lane_length[lane], 1e-6)) * lane_length[other]
+        segment = segment_start[other]
+        while segment + 1 < segment_start[other + 1] and position[segment + 1] <= there:
+            segment += 1
+        segments[i] = segment
+        _settle(rows[i], segment, begin, direction, length, position)
 
 
 @njit(cache=True)

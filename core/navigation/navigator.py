@@ -19,6 +19,7 @@ from typing import Protocol
 from hippodrome.core.localization.localizer import Localizer
 from hippodrome.core.navigation import motion as motions
 from hippodrome.core.navigation.belief import Belief
+from hippodrome.core.navigation.blockage import STANDING_MPS, Blockage
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.driving import BARRED, pace
 from hippodrome.core.navigation.escape import Escape
@@ -30,7 +31,7 @@ from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
 from hippodrome.core.navigation.track import Track
-from hippodrome.core.navigation.types import Command, DrivingState, Goal, Indicator, Lamp, Radar
+from hippodrome.core.navigation.types import Command, DrivingState, Goal, Indicator, Radar
 from hippodrome.core.navigation.watch import SensorHealth, is_dark, watched
 from hippodrome.core.navigation.whereabouts import Place
 from hippodrome.core.roads.network import RoadNetwork
@@ -40,17 +41,7 @@ __all__ = ["Navigator", "NavigatorConfig", "PoseSource"]
 
 BLOCKED = "the street is blocked"
 NO_ROOM = "no way leads on, and there is no room to turn round"
-AGAIN_S = 5.0  # later it is tried again to turn round where there was no room
-STANDING_MPS = 0.1
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
-OBSTACLE_M = 10.0  # who stands nearer than this before something waits for it
-MISFITS = 3  # readings in a row that contradict the pose across the lane, before it is loosened
-AHEAD_M, HALF_BODY_M = (5.0, 13.0), 0.7  # of the path ahead, which must not lead off the road
-OFF_ROAD, OFF_ROAD_FRAMES = 0.3, 3  # share of it that is seen to be no road, in so many frames: the place is wrong ..
-LEAST_SHIFT_M, MOST_SHIFT_M, SHIFT_SIGMA_M = 1.5, 6.0, 0.8  # .. unless the vehicle may be so much farther on, or less far
-REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
-SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
-BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 ROUND_M = 250.0  # searched round one block, then straight on to the next ones, and so in turn
 ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
 
@@ -94,9 +85,10 @@ class Navigator:
         self._belief = Belief(config, self._planner, self._side)
         self._escape = Escape(config, self._senses, self._belief, self._planner, self._side)
         self._guide = Guide(config, self._planner) if config.search_network and poses is None else None
+        self._blockage = Blockage(config, self._senses, self._belief, self._planner, self._escape, self._guide)
         self._health = SensorHealth()
         self._has_goal = False
-        self._standing_s = self._at_goal_s = self._search_stood_s = self._searched_m = 0.0
+        self._at_goal_s = self._search_stood_s = self._searched_m = 0.0
         self._arrived = False
         self.estimate: LocalizationEstimate | None = None  # the localizer's last answer, for who looks on
 
@@ -149,7 +141,7 @@ class Navigator:
             return None
         turned_rad = observation.yaw_rate_radps * observation.dt_s
         told = None if self.estimate is None else self._belief.recognised_pose(self.estimate)
-        self._guide.step(distance_m, turned_rad, self._senses, told, self._belief.track is None)
+        self._guide.step(distance_m, turned_rad, self._senses, told, self._belief.track is None, self._belief.turns_round)
         return self._guide.fix
 
     def _decide(self, radar: Radar, dt_s: float) -> Command:
@@ -172,8 +164,8 @@ class Navigator:
             state = DrivingState.HALTED if halt else DrivingState.DOUBTING
             command = replace(command, acceleration_mps2=max(slowed, -3.0), state=state, reason=complaint)
         if not self._escape.is_under_way:
-            self._look_for_blockage(radar, command.reason == BARRED, dt_s)
-        if self._standing_s >= self._config.drive.blocked_s and command.state in (DrivingState.DRIVING, DrivingState.DOUBTING):
+            self._blockage.step(radar, command.reason == BARRED, dt_s)
+        if self._blockage.blocks and command.state in (DrivingState.DRIVING, DrivingState.DOUBTING):
             return replace(command, state=DrivingState.HALTED, reason=BLOCKED)
         return command
 
@@ -249,36 +241,14 @@ class Navigator:
         assert self._belief.track is not None and self.estimate is not None
         drive = self._config.drive
         self._at_goal_s += dt_s
-        if self._belief.track.along_sigma_m < drive.goal_sigma_m and self._belief.since_fix_m > drive.settled_m:
+        is_known = self._belief.track.along_sigma_m < drive.goal_sigma_m and self._belief.since_fix_m > drive.settled_m
+        if is_known and (self._guide is None or self._guide.vouches(self._belief.track.pose)):
             self._arrived = True
             return self._standing(DrivingState.ARRIVED, "has arrived")
         if self._at_goal_s > ROUND_AGAIN_S:
             self._at_goal_s = 0.0
             self._belief.plan = self._planner.plan(self._belief.track.pose, 0.0, beyond_goal=True)
         return self._standing(DrivingState.DOUBTING, "cannot vouch for the goal's place")
-
-    def _look_for_blockage(self, radar: Radar, barred: bool, dt_s: float) -> None:
-        """A road counts as closed where the vehicle has stood long before something, though no lamp is red."""
-        waits = (barred or radar.gap_m < OBSTACLE_M) and radar.lamp not in (Lamp.RED, Lamp.YELLOW) and not radar.blind
-        standing = self._senses.motion.speed_mps < STANDING_MPS
-        self._standing_s = self._standing_s + dt_s if standing and waits else 0.0
-        if self._standing_s < self._config.drive.blocked_s:
-            return
-        plan, track = self._belief.plan, self._belief.track
-        gate = None if plan is None else plan.gate()
-        if plan is None or track is None:
-            self._standing_s = 0.0 if self._escape.barred(radar.gap_m) else self._standing_s - AGAIN_S
-        elif gate is not None and gate.edge >= 0 and gate.entry_u_m - plan.u_m < OBSTACLE_M + self._config.vehicle.front_m:
-            self._standing_s = 0.0
-            self._planner.close(gate.edge)
-            self._belief.plan = self._planner.plan(track.pose, 0.0)
-            if self._belief.plan is None:
-                self._planner.open_all()
-        elif self._standing_s >= self._config.drive.turns_round_s and self._planner.close_own(track.pose):
-            begins = self._escape.barred(radar.gap_m)
-            self._standing_s = 0.0 if begins else self._config.drive.blocked_s
-            if not begins:
-                self._planner.open_all()
 
     def _standing(self, state: DrivingState, reason: str) -> Command:
         """Stop, and stand."""

@@ -17,6 +17,8 @@ SAME_WAY_RAD = math.radians(50.0)
 FARTHEST_M = 3.5  # a vehicle farther from every lane's middle is on none of them
 OPPOSITE_M = 8.0  # to the lane of the opposite direction: two lanes aside
 METRES_PER_RAD = 4.0  # what an angle to a lane counts against a distance from it
+SPEAKS = 0.5  # from which on borders tell of the oncoming lane: offsets alone do not, beside the road they would fit, too
+EDGE_M = 1.0  # what a border that is not as the network has it counts against a distance
 INTERNAL_M = 1.0  # by which ways through junctions count as farther away: they overlap, and roads are surer
 
 
@@ -74,13 +76,67 @@ def place_beside(roads: RoadGeometry, pose: FloatArray, lane: int, position_m: f
     return LanePlace(lane, position_m, float(heading), float(offset))
 
 
-def lane_that_is_read(roads: RoadGeometry, pose: FloatArray, place: LanePlace, reading: RoadReading) -> LanePlace:
-    """The lane that a reading speaks of: the one of the place, or the one beside it that fits better."""
-    candidates = [place]
+def lane_that_is_read(
+    roads: RoadGeometry, pose: FloatArray, place: LanePlace, reading: RoadReading, side: float = -1.0
+) -> LanePlace:
+    """The lane that a reading speaks of: the one of the place, or one beside it that fits better, be it an oncoming one.
+
+    How well a lane fits is told by the place across it, and by which of its borders are edges of the road. An oncoming lane
+    counts where both borders that are seen are as its own. It is given as the vehicle sees it: with the vehicle's own direction,
+    and the offset to the left of that. ``side`` is 1 where traffic keeps left, -1 where it keeps right.
+    """
+    oncoming = oncoming_place(roads, pose)
+    beyond = 0.0 if oncoming is None else -side
+    candidates = [(place, *_edges(roads, place.lane, beyond))]
     for lane in roads.network.adjacent_lanes(place.lane):
         share = place.position_m / max(float(roads.lane_length_m[place.lane]), 1e-6)
-        candidates.append(place_beside(roads, pose, lane, share * float(roads.lane_length_m[lane])))
-    return min(candidates, key=lambda one: abs(one.offset_m - reading.offset_m) + (0.0 if one is place else 0.3))
+        beside = place_beside(roads, pose, lane, share * float(roads.lane_length_m[lane]))
+        candidates.append((beside, *_edges(roads, lane, beyond)))
+    if oncoming is not None and speaks_for_oncoming(roads, place, reading, side) > SPEAKS:
+        right, left = _edges(roads, oncoming.lane, beyond)  # of the oncoming lane's own left and right
+        candidates.append((oncoming, left, right))
+
+    def misfit_m(one: tuple[LanePlace, bool, bool]) -> float:
+        beside, left, right = one
+        wrong = _misjudged(reading.left_edge, left) + _misjudged(reading.right_edge, right)
+        return abs(beside.offset_m - reading.offset_m) + (0.0 if beside is place else 0.3) + EDGE_M * wrong
+
+    return min(candidates, key=misfit_m)[0]
+
+
+def oncoming_place(roads: RoadGeometry, pose: FloatArray) -> LanePlace | None:
+    """The nearest lane of the opposite direction beside a pose (3,), as seen along the pose; None where there is none."""
+    there = opposite_lane(roads, pose)
+    return None if there is None else LanePlace(there.lane, there.position_m, there.heading_rad + math.pi, -there.offset_m)
+
+
+def speaks_for_oncoming(roads: RoadGeometry, place: LanePlace, reading: RoadReading, side: float = -1.0) -> float:
+    """How much a reading speaks for the oncoming lane, against the lane that the vehicle is taken to be on: -1 to 1.
+
+    Of a lane that has the road's edge on its one side and a lane on its other, the oncoming one is the mirror image.
+    """
+    left, right = _edges(roads, place.lane, -side)
+    if left == right or not (math.isfinite(reading.left_edge) and math.isfinite(reading.right_edge)):
+        return 0.0
+    read = reading.left_edge - reading.right_edge
+    return -read if left else read
+
+
+def _edges(roads: RoadGeometry, lane: int, oncoming: float) -> tuple[bool, bool]:
+    """Whether the left and the right border of a lane are edges of the road.
+
+    ``oncoming`` says on which side of the road the oncoming lanes are: 1 left, -1 right, 0 on none.
+    """
+    network = roads.network
+    left, right = int(network.left_lane[lane]) < 0, int(network.right_lane[lane]) < 0
+    return left and oncoming <= 0.0, right and oncoming >= 0.0
+
+
+def _misjudged(edge: float, is_edge: bool) -> float:
+    """Probability that a border is not what it is in the network; 0 where it was not seen."""
+    if not math.isfinite(edge):
+        return 0.0
+    return 1.0 - edge if is_edge else edge
 
 
 def keeps_left(roads: RoadGeometry) -> bool:

@@ -67,6 +67,21 @@ def way_poses(network: RoadNetwork, pieces: Sequence[Piece], ahead_m: FloatArray
     return poses
 
 
+def strip(way: FloatArray, half_m: float) -> FloatArray:
+    """Points (3 n, 2) on a way (n, 3) and ``half_m`` to either side of it."""
+    left = np.stack([-np.sin(way[:, 2]), np.cos(way[:, 2])], axis=1)
+    points: FloatArray = np.concatenate([way[:, :2] + aside * left for aside in (-half_m, 0.0, half_m)])
+    return points
+
+
+def moved(pose: FloatArray, distance_m: float, turned_rad: float) -> FloatArray:
+    """A pose after a short arc."""
+    chord = pose[2] + 0.5 * turned_rad
+    step = np.array([distance_m * math.cos(chord), distance_m * math.sin(chord), turned_rad])
+    after: FloatArray = pose + step
+    return after
+
+
 def _points(network: RoadNetwork, piece: Piece) -> FloatArray:
     """The middle (n, 2) of a stretch of a lane."""
     count = max(math.ceil(piece.length_m / 1.0), 1) + 1

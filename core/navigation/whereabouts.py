@@ -13,7 +13,9 @@ from typing import Final
 import numpy as np
 
 from hippodrome.core.navigation import hypotheses as hyp
-from hippodrome.core.navigation.paving import LEVEL_M, MOST_LEVEL, Paving, paving
+from hippodrome.core.navigation.glance import ground_cost, ground_points, mean_rad, segment_at
+from hippodrome.core.navigation.paving import Paving, paving
+from hippodrome.core.navigation.placing import opposite_lanes
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.track import STOP_LINE_BEFORE_END_M
 from hippodrome.core.reading.types import LaneEnd, RoadReading
@@ -27,7 +29,6 @@ ROOM: Final = 2000  # for those that split
 PER_BIN, BIN_M = 15, 2.0  # later there are so many for each stretch of lane on which there are any
 LOOK_EVERY_M: Final = 1.0  # the ground is compared so often ..
 GROUND_PER_M: Final = 0.06  # .. and each point of it counts so much per metre: it is seen over and over again
-EDGE_M, BLUR_M, OUTLIER = 0.2, 0.3, 0.2  # the paving's edge is seen so far inside, so blurred; and what is seen wrongly
 READ_SIGMA_M, READ_GATE_M, READ_GATE_RAD, READ_GAIN, READ_WEIGHT = 0.4, 1.2, 0.35, 0.2, 0.15
 END_SIGMA_M, END_OUTLIER, END_WEIGHT = 0.8, 0.2, 0.3
 TOLD_M, TOLD_RAD, TOLD_OUTLIER, TOLD_PER_M = 1.5, 0.3, 0.02, 0.4  # of the localizer's pose, whose errors repeat
@@ -39,7 +40,6 @@ SCALE_MEMORY_M: Final = 60.0  # over which a scale is forgotten
 LOST, LOST_PER_M = 0.75, 0.15  # the ground as the likeliest place has it, averaged over some 7 m: below that all are wrong
 CLUSTER_M, CLUSTER_RAD = 5.0, 0.7  # particles so near to one another are of one place
 LEAST_POINTS: Final = 20  # of the ground, which must be known
-FORWARD_M, ASIDE_M, GRID_M = (-3.0, 13.0), 7.0, 1.0  # of the ground that is compared
 SEED: Final = 17
 
 
@@ -80,8 +80,8 @@ class Whereabouts:
     def __init__(self, roads: RoadGeometry, seed: int = SEED) -> None:
         self._roads, self._seed = roads, seed
         self._paving: Paving = paving(roads.network)
-        self._cost = _ground_cost()
-        self._grid = _ground_points()
+        self._cost = ground_cost()
+        self._grid = ground_points()
         network = roads.network
         self._lanes = (
             roads.segment_lane, roads.segment_start, roads.segment_begin_m, roads.segment_direction, roads.segment_length_m,
@@ -89,6 +89,7 @@ class Whereabouts:
             network.left_lane.astype(np.int32), network.right_lane.astype(np.int32), network.width_m.astype(np.float64),
             roads.lane_length_m,
         )  # fmt: skip
+        self._opposite = np.array(opposite_lanes(roads), dtype=np.int32)
         self.restarts = 0
         self.begin()
 
@@ -111,7 +112,7 @@ class Whereabouts:
         rows[:, hyp.HEADING] = wrap(poses[:, 2] + heading_rad)
         rows[:, hyp.SCALE] = self._rng.standard_normal(wanted)
         rows[:, hyp.ALONG], rows[:, hyp.ASIDE], rows[:, hyp.TURN] = position, offset_m, heading_rad
-        self._segments[:wanted] = _segment_at(self._roads, lane, position)
+        self._segments[:wanted] = segment_at(self._roads, lane, position)
         self._agreement = np.ones(wanted + ROOM)
         self.fits = 1.0
         self._since_look_m = self.driven_m = 0.0
@@ -156,6 +157,18 @@ class Whereabouts:
                 self._doubt(senses, self._since_look_m)
             self._since_look_m = 0.0
             self._renew()
+
+    def turn_round(self) -> None:
+        """The vehicle has turned round: what has turned against its lane is on the lane of the opposite direction."""
+        lanes = self._roads.segment_lane, self._roads.segment_start, *self._lanes[2:6], self._opposite, self._roads.lane_length_m
+        hyp.turn_round(self._rows, self._segments, self._count, *lanes)
+
+    def move_aside(self, aside_m: float) -> None:
+        """Move all hypotheses to the left of their headings."""
+        rows = self._rows[: self._count]
+        rows[:, hyp.X] -= aside_m * np.sin(rows[:, hyp.HEADING])
+        rows[:, hyp.Y] += aside_m * np.cos(rows[:, hyp.HEADING])
+        rows[:, hyp.ASIDE] += aside_m
 
     def _read(self, reading: RoadReading) -> None:
         """Weigh by the lane that was read."""
@@ -246,7 +259,7 @@ class Whereabouts:
         inverse = np.unique(key, return_inverse=True)[1]
         heaviest = int(np.argmax(np.bincount(inverse, weights=share)))
         mine = inverse == heaviest
-        centre = np.array([*(share[mine] @ rows[mine, :2] / share[mine].sum()), _mean_rad(rows[mine, hyp.HEADING], share[mine])])
+        centre = np.array([*(share[mine] @ rows[mine, :2] / share[mine].sum()), mean_rad(rows[mine, hyp.HEADING], share[mine])])
         return self.near(centre, share)
 
     def near(self, pose: FloatArray, share: FloatArray | None = None) -> Place:
@@ -267,32 +280,3 @@ class Whereabouts:
         covariance = (part[:, None] * off).T @ off
         agreement = float(part @ self._agreement[: self._count][mine])
         return Place(np.array([centre[0], centre[1], wrap(centre[2])]), covariance, total, agreement)
-
-
-def _mean_rad(angles: FloatArray, share: FloatArray) -> float:
-    return math.atan2(float(share @ np.sin(angles)), float(share @ np.cos(angles)))
-
-
-def _segment_at(roads: RoadGeometry, lane: IntArray, position_m: FloatArray) -> IntArray:
-    """The segment (n,) of each lane at an arc length."""
-    offset = np.concatenate([[0.0], np.cumsum(roads.lane_length_m)])
-    begins = roads.segment_position_m + offset[roads.segment_lane]
-    segment = np.searchsorted(begins, position_m + offset[lane], side="right") - 1
-    clipped: IntArray = np.clip(segment, roads.segment_start[lane], roads.segment_start[lane + 1] - 1).astype(np.int32)
-    return clipped
-
-
-def _ground_points() -> tuple[FloatArray, FloatArray]:
-    """The places ahead of the vehicle that are compared, in two lots that take turns, as the colours of a chess board do."""
-    x, y = np.meshgrid(np.arange(*FORWARD_M, GRID_M), np.arange(-ASIDE_M, ASIDE_M + 0.1, GRID_M), indexing="ij")
-    parity = (np.arange(x.shape[0])[:, None] + np.arange(x.shape[1])[None, :]) % 2
-    points = np.stack([x, y], axis=-1)
-    return np.ascontiguousarray(points[parity == 0]), np.ascontiguousarray(points[parity == 1])
-
-
-def _ground_cost() -> FloatArray:
-    """What it costs (2, 2 * MOST_LEVEL + 1) to see road, and to see none, at each level of the raster: -ln of its probability."""
-    distance = LEVEL_M * np.arange(-MOST_LEVEL, MOST_LEVEL + 1)
-    paved = 1.0 / (1.0 + np.exp((EDGE_M - distance) / BLUR_M))
-    road = 0.5 * OUTLIER + (1.0 - OUTLIER) * paved
-    return np.stack([-np.log(road), -np.log(1.0 - road)])

@@ -8,12 +8,14 @@ import pytest
 
 from hippodrome.core.navigation.agreement import agreed_m, lane_field
 from hippodrome.core.navigation.config import NavigatorConfig
-from hippodrome.core.navigation.guidance import LOOK_M, Guide
+from hippodrome.core.navigation.guidance import GUESS, LOOK_M, REASON, Guide
 from hippodrome.core.navigation.paving import paving
 from hippodrome.core.navigation.pilot import RoutePlanner
 from hippodrome.core.navigation.searching import LaneMemory
+from hippodrome.core.navigation.types import Radar
 from hippodrome.core.navigation.ways import way_poses, ways_ahead
 from hippodrome.core.navigation.whereabouts import Whereabouts
+from hippodrome.core.reading.types import LaneEnd, RoadReading
 from hippodrome.core.roads.geometry import road_geometry
 from tests.core.navigation.roads import arc, map_along, network_of
 
@@ -123,6 +125,9 @@ def test_what_tells_them_apart_gives_a_fix_at_the_right_place():
     guide, eyes = guide_on(network), Eyes(network)
     truth = drive(lambda d, t, eyes: guide.step(d, t, eyes, None, True), eyes, (20.0, 0.0, 0.0), [*LEFT[:2], (10.0, 0.0)])
     assert guide.fix is not None and np.hypot(*(guide.fix.pose - truth)[:2]) < 1.5
+    assert guide.vouches(truth) and not guide.vouches(truth + np.array([0.0, 300.0, 0.0]))
+    guide.whereabouts.fits = 0.8
+    assert not guide.vouches(truth)
 
 
 def test_a_recognised_view_decides_between_roads_that_are_alike():
@@ -181,3 +186,40 @@ def test_ways_ahead_are_all_ways_on_but_turning_back():
     network = network_of(lines, [(0, 2), (2, 1), (0, 3), (0, 4)], internal=(2,))
     ways = ways_ahead(network, network.lane_lengths_m(), 0, 50.0, 26.0)
     assert sorted(way[-1].lane for way in ways) == [3, 4]
+
+
+def guided(eyes):
+    """A guide on one of two roads that are alike, 18 m before their ends."""
+    guide = guide_on(twins())
+    drive(lambda d, t, eyes: guide.step(d, t, eyes, None, True), eyes, (20.0, 0.0, 0.0), LEFT)
+    return guide
+
+
+def test_a_stop_line_that_is_seen_holds_the_vehicle_where_no_hypothesis_has_one():
+    eyes = Eyes(twins())
+    guide = guided(eyes)
+    free, taken = Radar(), Radar(way_is_free=False)
+    assert guide.command(taken, 5.0).acceleration_mps2 == guide.command(free, 5.0).acceleration_mps2
+    eyes.reading = RoadReading(end_m=9.0, end_variance_m2=0.1, end=LaneEnd.STOP_LINE)
+    guide.step(0.1, 0.0, eyes, None, True)
+    assert guide.command(taken, 5.0).acceleration_mps2 < -1.0 and guide.command(taken, 5.0).reason == "gives way"
+    assert guide.command(free, 5.0).acceleration_mps2 > -1.0
+    guide.step(12.0, 0.0, eyes, None, True)  # passed, and no more seen
+    eyes.reading = None
+    guide.step(0.1, 0.0, eyes, None, True)
+
+
+@pytest.mark.parametrize("sees", [True, False])
+def test_where_all_places_fit_badly_it_creeps_on_road_that_it_sees_and_nowhere_else(sees):
+    eyes = Eyes(twins())
+    guide = guided(eyes)
+    assert guide.command(Radar(), 1.0).reason == REASON
+    guide.whereabouts.fits = 0.8
+    if not sees:
+        eyes.kinds_at = lambda points_m: np.zeros(len(points_m), dtype=np.uint8)
+    guide.step(1.1, 0.0, eyes, None, True)
+    guide.whereabouts.fits = 0.8
+    command = guide.command(Radar(), 3.0)
+    assert (command is not None) is sees
+    if sees:
+        assert command.reason == GUESS and command.acceleration_mps2 < 0.0

@@ -91,7 +91,15 @@ class Belief:
             return
         self._follow_network(found, distance_m)
         self._follow_localizer(estimate, distance_m, observation.dt_s, found, where)
+        if self.track is not None and senses.footing.is_off_road:
+            self.lose(estimate)
         self._correct_by_lane(observation, estimate, senses, distance_m, where)
+
+    def lose(self, estimate: LocalizationEstimate) -> None:
+        """Give the pose up, and do not take it from the localizer again: what is seen contradicts it."""
+        self._refuted, self._refuted_m = tracks.begun(estimate.pose, estimate.covariance), 0.0
+        self.track = self.plan = None
+        self._off_road = 0
 
     def recognised_pose(self, estimate: LocalizationEstimate) -> FloatArray | None:
         """The localizer's pose, where it has just recognised a view."""
@@ -269,9 +277,7 @@ class Belief:
         if abs(shift_m) >= TRUSTED_SHIFT_M and self._off_road == 0:
             self.track, _ = tracks.farther_on(track, shift_m, SHIFT_SIGMA_M)
         if self._off_road >= OFF_ROAD_FRAMES:
-            self._refuted, self._refuted_m = tracks.begun(estimate.pose, estimate.covariance), 0.0
-            self.track = self.plan = None
-            self._off_road = 0
+            self.lose(estimate)
             return
         gate = plan.gate()
         near_turn = Indicator.RIGHT if self._side < 0.0 else Indicator.LEFT

@@ -120,6 +120,13 @@ class Escape:
             return self._turn(math.inf)
         return self._back(back_m, math.inf if turns else None)
 
+    def to_road(self, back_m: float, radar: Radar) -> bool:
+        """Whether it begins to back off along its own way, which was on the road before."""
+        if radar.gap_behind_m < BEHIND_M or self._attempts_left() <= 0:
+            return False
+        self._attempts += 1
+        return self._back(back_m, None)
+
     def barred(self, gap_m: float) -> bool:
         """Whether a turn begins before something that bars the street, or, with an infinite gap, because no way leads on."""
         track = self._belief.track

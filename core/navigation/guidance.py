@@ -75,7 +75,7 @@ class Guide:
         self.agreed_m = self.guessed_m = 0.0
         self._to_goal = False
         self._since_look_m, self._since_try_m, self._sure_m = 0.0, TRY_EVERY_M, 0.0
-        self._off_road = 0
+        self._off_road, self._is_off_road = 0, False
         self._turned_round = self._sees_road = False
         self._end_m = math.inf  # to the end of the lane that was seen last
         self.places_given_up = 0  # that were followed
@@ -93,6 +93,14 @@ class Guide:
     def way_to_goal(self) -> tuple[Plan | None, FloatArray | None]:
         """The way to the goal from the likeliest place and the pose there, where that is what is driven."""
         return (self.plan, self.pose) if self._to_goal and self.plan is not None else (None, None)
+
+    def _check_footing(self, is_off_road: bool) -> None:
+        """Give up the place that was followed, or was sure, where the vehicle comes to be beside the road."""
+        if is_off_road and not self._is_off_road:
+            self.whereabouts.spread()
+            self.pose, self._sure_m = None, 0.0
+            self.plan_anew()
+        self._is_off_road = is_off_road
 
     def plan_anew(self) -> None:
         """Look for another way at once: a road was closed."""
@@ -126,9 +134,9 @@ class Guide:
             self.pose = moved(self.pose, distance_m, turned_rad)
         if self.place is not None:
             self.place = self.place.at(moved(self.place.pose, distance_m, turned_rad))
+        self._check_footing(senses.footing.is_off_road)
         self._see_end(senses.reading, distance_m)
-        self._since_look_m += abs(distance_m)
-        self._since_try_m += abs(distance_m)
+        self._since_look_m, self._since_try_m = self._since_look_m + abs(distance_m), self._since_try_m + abs(distance_m)
         if self._since_look_m >= 1.0:
             self._look(senses, searches)
             self._since_look_m = 0.0
@@ -143,8 +151,8 @@ class Guide:
         """Look for the likeliest place, and for what can be driven from there."""
         where = self.whereabouts
         self.place = best = where.best()
-        is_sure = best.share > FIX_SHARE and best.sigma_m < FIX_SIGMA_M and where.fits > FIX_FITS
-        self._sure_m = self._sure_m + self._since_look_m if is_sure else 0.0
+        is_sure = best.share > FIX_SHARE and best.sigma_m < FIX_SIGMA_M and not senses.footing.is_doubtful
+        self._sure_m = self._sure_m + self._since_look_m if is_sure and where.fits > FIX_FITS else 0.0
         self.agreed_m = self.guessed_m = 0.0
         if not searches:
             return

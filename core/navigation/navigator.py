@@ -23,6 +23,7 @@ from hippodrome.core.navigation.blockage import STANDING_MPS, Blockage
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.driving import BARRED, pace
 from hippodrome.core.navigation.escape import Escape
+from hippodrome.core.navigation.footing import Footing
 from hippodrome.core.navigation.guidance import Guide
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, is_missed
 from hippodrome.core.navigation.placing import keeps_left, lane_of
@@ -40,6 +41,8 @@ from hippodrome.core.types import CognitiveMap, LocalizationEstimate, Localizati
 __all__ = ["Navigator", "NavigatorConfig", "PoseSource"]
 
 BLOCKED = "the street is blocked"
+BESIDE_ROAD = "is beside the road"
+MORE_M = 3.0  # backed off beyond where the vehicle came off the road
 NO_ROOM = "no way leads on, and there is no room to turn round"
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
 ROUND_M = 250.0  # searched round one block, then straight on to the next ones, and so in turn
@@ -152,6 +155,8 @@ class Navigator:
         if self._arrived:
             return self._standing(DrivingState.ARRIVED, "has arrived")
         command = self._escape.step(radar, dt_s)
+        if command is None and self._senses.footing.is_off_road:
+            command = self._beside_road(radar, dt_s)
         if command is None:
             self._keep_plan()
             command = self._searching(radar, dt_s) if self._belief.plan is None else self._driving(radar, dt_s)
@@ -168,6 +173,17 @@ class Navigator:
         if self._blockage.blocks and command.state in (DrivingState.DRIVING, DrivingState.DOUBTING):
             return replace(command, state=DrivingState.HALTED, reason=BLOCKED)
         return command
+
+    def _beside_road(self, radar: Radar, dt_s: float) -> Command | None:
+        """Stops beside the road, and backs off to it; None where it cannot: then it goes on by what it sees."""
+        if self._belief.track is not None:
+            return None  # exact poses are believed
+        if self._senses.motion.speed_mps > STANDING_MPS:
+            standing = self._standing(DrivingState.SEARCHING, BESIDE_ROAD)
+            return replace(standing, steering_rad=0.0)  # the bend that led off the road would lead farther off
+        back_m = self._senses.footing.beside_m + MORE_M
+        self._senses.footing = Footing()
+        return self._escape.step(radar, dt_s) if self._escape.to_road(back_m, radar) else None
 
     def _keep_plan(self) -> None:
         """Make a plan where there is none and there can be one; drop one that was missed."""

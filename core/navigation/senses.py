@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from hippodrome.core.navigation import footing as footings
 from hippodrome.core.navigation import motion as motions
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.dashes import LEAST_M, MOST_M, LineView, driven_m, line_levels
@@ -37,6 +38,7 @@ class Senses:
         self.motion = motions.Motion()
         self.reading: RoadReading | None = None  # of this step's frame
         self.memory = LaneMemory()
+        self.footing = footings.Footing()
 
     @property
     def metres_per_unit(self) -> float:
@@ -64,6 +66,7 @@ class Senses:
         self.ground.move(distance_m, observation.yaw_rate_radps * observation.dt_s)
         if observation.frame is not None:
             self.ground.see(observation.frame, radar.gap_m)
+        self.footing = footings.stepped(self.footing, self.ground, distance_m)
         return distance_m
 
     def _read(self, observation: Observation, distance_m: float) -> None:

@@ -40,6 +40,7 @@ SCALE_MEMORY_M: Final = 60.0  # over which a scale is forgotten
 LOST, LOST_PER_M = 0.75, 0.15  # the ground as the likeliest place has it, averaged over some 7 m: below that all are wrong
 CLUSTER_M, CLUSTER_RAD = 5.0, 0.7  # particles so near to one another are of one place
 LEAST_POINTS: Final = 20  # of the ground, which must be known
+SPREAD: Final = (2.0, 2.0, 0.06)  # m, m, rad: how far off all may be that are beside the road
 SEED: Final = 17
 
 
@@ -169,6 +170,12 @@ class Whereabouts:
         rows[:, hyp.X] -= aside_m * np.sin(rows[:, hyp.HEADING])
         rows[:, hyp.Y] += aside_m * np.cos(rows[:, hyp.HEADING])
         rows[:, hyp.ASIDE] += aside_m
+
+    def spread(self) -> None:
+        """Let each hypothesis be some metres off: the vehicle is beside the road, where none of the likely ones has it."""
+        self._rows[: self._count, :3] += self._rng.standard_normal((self._count, 3)) * SPREAD
+        self._rows[: self._count, hyp.WEIGHT] = 0.0
+        self.fits = 1.0
 
     def _read(self, reading: RoadReading) -> None:
         """Weigh by the lane that was read."""

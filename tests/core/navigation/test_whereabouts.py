@@ -8,6 +8,7 @@ import pytest
 
 from hippodrome.core.navigation.agreement import agreed_m, lane_field
 from hippodrome.core.navigation.config import NavigatorConfig
+from hippodrome.core.navigation.footing import Footing
 from hippodrome.core.navigation.guidance import GUESS, LOOK_M, REASON, Guide
 from hippodrome.core.navigation.paving import paving
 from hippodrome.core.navigation.pilot import RoutePlanner
@@ -29,6 +30,7 @@ class Eyes:
 
     def __init__(self, network=None):
         self.pose, self.reading, self.memory, self.ground = np.zeros(3), None, LaneMemory(), self
+        self.footing = Footing()
         self._raster = None if network is None else paving(network)
 
     def kinds_at(self, points_m):

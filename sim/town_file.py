@@ -38,7 +38,8 @@ def kept_town(net_file: Path, folder: Path, read: Callable[[], Town]) -> Town:
         folder: Where the town is kept, under a name that the network's bytes and our code give.
         read: Reads and checks the network.
     """
-    if net_file.stat().st_size <= (LARGE_PACKED_BYTES if net_file.suffix == ".gz" else LARGE_BYTES):
+    most_bytes = LARGE_PACKED_BYTES if net_file.suffix == ".gz" else LARGE_BYTES
+    if not net_file.is_file() or net_file.stat().st_size <= most_bytes:  # who reads a file that is not there says so
         return read()
     recipe = sha256_of(net_file), net_file.name, code_sha256(PACKAGE, CODE), version("eclipse-sumo")
     path = folder / f"{net_file.name.partition('.')[0]}-{hashlib.sha256(repr(recipe).encode()).hexdigest()[:12]}.town.npz"

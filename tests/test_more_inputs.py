@@ -114,7 +114,7 @@ NETWORKS = {
     "no-lanes": (swap(r"<lane [^>]*/>", "", 0), "a lane is named that its edge does not have"),
     "same-name-twice": (swap(r'<edge id="A1A0"', '<edge id="A0A1"'), "'A1A0' is named and not described"),
     "to-nowhere": (swap(r'(<edge id="A0A1"[^>]*to=")A1', r"\1nowhere"), "junction 'nowhere', which the file does not describe"),
-    "length-of-zero": (swap(r'(<lane id="A0A1_0"[^>]*length=")[^"]*', r"\g<1>0"), ""),
+    "length-of-zero": (swap(r'(<lane id="A0A1_0"[^>]*length=")[^"]*', r"\g<1>0"), "lane 'A0A1_0'"),
     "connection-to-no-lane": (
         swap(r'(<connection from="A0A1"[^>]*toLane=")0', r"\g<1>7"),
         "a lane is named that its edge does not have",

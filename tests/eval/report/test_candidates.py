@@ -54,8 +54,9 @@ def test_views_of_another_kind_have_no_candidates():
 def test_lanes_beside_a_place_are_named_by_their_distance():
     lines = [np.array([[0.0, y_m], [100.0, y_m]]) for y_m in (0.0, 3.0, 6.0, 9.0, 12.0, 90.0)]
     roads = SimpleNamespace(
-        lane_count=len(lines), lane_ids=[f"lane-{i}" for i in range(len(lines))], lane_points_m=lambda lane: lines[lane]
-    )
+        lane_count=len(lines), lane_ids=[f"lane-{i}" for i in range(len(lines))], lane_points_m=lambda lane: lines[lane],
+        points_m=np.concatenate(lines), point_start=2 * np.arange(len(lines) + 1),
+    )  # fmt: skip
     found = lanes_beside(np.array([50.0, 0.5]), roads, own=0)
     assert [(one.lane, one.apart_m) for one in found] == [("lane-1", 2.5), ("lane-2", 5.5), ("lane-3", 8.5)]
     assert lanes_beside(np.array([50.0, 500.0]), roads, own=-1) == ()

@@ -54,7 +54,7 @@ def stop_line(
 ) -> tuple[float, float]:
     """Distance (m) of the stop line's near edge ahead of the rear axle, and its variance: inf where there is none.
 
-    ``paint_levels`` is how much brighter paint is than the road.
+    ``paint_levels`` is how much brighter paint is than the road. A bar that reaches to the last row is none.
     """
     nothing = (np.nan, np.inf)
     count = len(levels)
@@ -71,6 +71,8 @@ def stop_line(
         last = row
         while last + 1 < count and levels[last + 1] > top:
             last += 1
+        if last + 1 == count:  # whether it ends is not seen
+            return nothing
         middle, deep = _bar(levels, along_m, forward_m, row, last, before, paint_levels)
         if SHALLOWEST * depth_m < deep < DEEPEST * depth_m:
             spacing = abs(along_m[min(last + 1, count - 1)] - along_m[row - 1]) / (last - row + 2)

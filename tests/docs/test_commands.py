@@ -247,6 +247,8 @@ def test_a_cheap_command_runs(words, files, run, tmp_path, monkeypatch, capsys):
     if words[0] == "export" and words[1] != "topo.pbstream":
         arguments[1] = str(files["FOLDER"])
     for place, word in enumerate(words):
+        if word == "--figures":
+            arguments[place + 1] = str(tmp_path / "figures")
         if word == "--out":  # a new place; a drive that is drawn already is not drawn again
             arguments[place + 1] = str(run.out if words[0] == "render" else tmp_path / words[place + 1])
     assert main(arguments) == 0, capsys.readouterr().err

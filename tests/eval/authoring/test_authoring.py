@@ -159,7 +159,9 @@ def test_keys_are_those_of_the_model():
         else:
             yield ".".join(path)
 
-    assert {key.name for key in scenario_keys()} - {"methods", "missions.policies"} == set(leaves(Scenario(name="x").model_dump(mode="json")))
+    assert {key.name for key in scenario_keys()} - {"methods", "missions.policies"} == set(
+        leaves(Scenario(name="x").model_dump(mode="json"))
+    )
 
 
 def test_reference_is_up_to_date():

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from hippodrome.core.navigation.paving import grid_over
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.roads.paths import centreline
 from hippodrome.core.types import FloatArray
@@ -42,11 +43,8 @@ class LaneField:
 
 def lane_field(network: RoadNetwork) -> LaneField:
     """The raster of a network."""
-    low, high = network.points_m.min(axis=0) - RIM_M, network.points_m.max(axis=0) + RIM_M
-    extent = np.maximum(high - low, 1.0)
-    cell_m = max(CELL_M, math.sqrt(float(extent.prod()) / MOST_CELLS))
-    shape = np.ceil(extent / cell_m).astype(np.int64)
-    bits = np.zeros((int(shape[0]), int(shape[1])), dtype=np.uint32)
+    low, cell_m, shape = grid_over(network, RIM_M, CELL_M, MOST_CELLS)
+    bits = np.zeros(shape, dtype=np.uint32)
     reach = math.ceil(BESIDE_M / cell_m)
     side = np.arange(-reach, reach + 1)
     around = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)

@@ -41,13 +41,21 @@ class Paving:
     cell_m: float
 
 
+def grid_over(
+    network: RoadNetwork, rim_m: float, least_cell_m: float, most_cells: int
+) -> tuple[FloatArray, float, tuple[int, int]]:
+    """The corner (2,), the width of a cell (m) and the cells along x and y of a raster of a network with a rim about it."""
+    low, high = network.points_m.min(axis=0) - rim_m, network.points_m.max(axis=0) + rim_m
+    extent = np.maximum(high - low, 1.0)
+    cell_m = max(least_cell_m, math.sqrt(float(extent.prod()) / most_cells))
+    shape = np.ceil(extent / cell_m).astype(np.int64)
+    return low, cell_m, (int(shape[0]), int(shape[1]))
+
+
 def paving(network: RoadNetwork) -> Paving:
     """The raster of a network."""
-    low, high = network.points_m.min(axis=0) - RIM_M, network.points_m.max(axis=0) + RIM_M
-    extent = np.maximum(high - low, 1.0)
-    cell_m = max(CELL_M, math.sqrt(float(extent.prod()) / MOST_CELLS))
-    shape = np.ceil(extent / cell_m).astype(np.int64)
-    mask = np.zeros((int(shape[0]), int(shape[1])), dtype=np.uint8)
+    low, cell_m, shape = grid_over(network, RIM_M, CELL_M, MOST_CELLS)
+    mask = np.zeros(shape, dtype=np.uint8)
     for lane in range(network.lane_count):
         _fill(mask, _strip(network.lane_points_m(lane), 0.5 * float(network.width_m[lane])), low, cell_m)
     for outline in _junctions(network):

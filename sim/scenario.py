@@ -25,6 +25,7 @@ from hippodrome.sim.yaml_file import load_yaml
 
 SCENARIO_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # results are filed under it
 METHOD_NAME = r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$"  # of a method: it stands in tables, and files are named after it
+ClosedCount = Annotated[int, Field(ge=0, le=100)]
 MethodName = Annotated[str, Field(pattern=METHOD_NAME)]
 
 
@@ -35,7 +36,7 @@ class DriveSpec(Spec):
     recording: Path | None = None  # folder of a recording, as `hippodrome import` writes, in place of the simulated drive
     traffic: TrafficSpec = TrafficSpec()
     ego: EgoSpec = EgoSpec()
-    closed: tuple[str, ...] = ()  # roads, by their names in SUMO's file, on which missions meet a van across each lane
+    closed: tuple[str, ...] | ClosedCount = ()  # roads where missions meet a van on each lane: SUMO's names, or how many to draw
     conditions: Conditions = Conditions()
 
     @model_validator(mode="before")

@@ -38,7 +38,7 @@ def reference_time_s(world: World, mission: Mission) -> float | None:
                 others.refill(ego_on_road=False)
             libsumo.simulationStep()
         try:
-            return _driven_s(mission, others, drive.closed)
+            return _driven_s(mission, others, world.closed_roads)
         except (libsumo.TraCIException, ValueError):  # no route, or a goal too close to where a lane begins to stop there
             return None
 

@@ -34,6 +34,7 @@ from hippodrome.eval.results.model import (
 )
 from hippodrome.eval.results.thresholds import failed_mission_limits
 from hippodrome.eval.run import RESULTS, load_scenarios, make_recordings
+from hippodrome.sim.loop.barriers import closed_roads
 from hippodrome.sim.record import RecordingPlan
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario
@@ -107,6 +108,9 @@ def drive_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path, film
     for policy in dict.fromkeys(row.policy for scenario in scenarios for row in rows_of(scenario) if row.policy is not None):
         check_policy(policy)  # what cannot be loaded is said before anything is simulated
     require_gl()
+    for scenario in scenarios:
+        if scenario.localization.closed:  # a road that is not there is told of before anything is drawn
+            closed_roads(scenario, RecordingPlan(scenario, "mapping", out).town().network)
     with worker_pool(workers) as pool:
         make_recordings([RecordingPlan(scenario, "mapping", out) for scenario in scenarios], pool)
         maps = pool.run("map", make_map, [MapTask(scenario, out) for scenario in scenarios])

@@ -27,6 +27,7 @@ from hippodrome.eval.drive.scoring import mission_result
 from hippodrome.eval.methods.warm_up import warm_up
 from hippodrome.eval.results.model import to_json
 from hippodrome.eval.reuse import figure_code_sha256
+from hippodrome.sim.loop.barriers import closed_roads
 from hippodrome.sim.loop.world import World
 from hippodrome.sim.record import RecordingPlan, close_renderer
 from hippodrome.sim.scenario import Scenario
@@ -70,9 +71,7 @@ def missions_of(scenario: Scenario, map_file: Path, out: Path, count: int) -> li
     """The missions of a scenario, drawn by its seed."""
     town = RecordingPlan(scenario, "mapping", out).town()
     mapped = mapped_lanes(surveyed(scenario, out), read_map(map_file), PlanConfig().mapped_within_m)
-    closed = frozenset(
-        town.network.edge_ids.index(name) for name in scenario.localization.closed if name in town.network.edge_ids
-    )
+    closed = frozenset(town.network.edge_ids.index(name) for name in closed_roads(scenario, town.network))
     return draw_missions(town.network, mapped, scenario.seed, count, closed)
 
 
@@ -120,7 +119,8 @@ def _flight(task: MissionTask, world: World) -> Flight:
 @lru_cache(maxsize=1)
 def _world(scenario: Scenario, out: Path) -> World:
     """The process's one world: missions of one town share it."""
-    return World(scenario, out, closed=scenario.localization.closed)
+    town = RecordingPlan(scenario, "mapping", out).town()
+    return World(scenario, out, closed=closed_roads(scenario, town.network))
 
 
 def _kept(file: Path, trace_file: Path) -> dict[str, Any] | None:

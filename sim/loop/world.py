@@ -75,6 +75,7 @@ class World:
         self._lookout = Lookout(self.ground, self.ways, self._rights)
         mapped_m = (1.0 - scenario.mapping.tour.revisit_share) * scenario.mapping.tour.planned_length_m()
         area = toured_area(self._graph, max(mapped_m, ROAM_PER_VEHICLE_M * self._drive.traffic.vehicles))
+        self.closed_roads = tuple(closed)
         self._closed = closed_edges(self.network, closed)
         self._area = area[~np.isin(self._graph.edges[area], self._closed)]
         self._walls = Walls(self.town, scenario.seed, scene_origin_m(self.town))

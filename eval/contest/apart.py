@@ -28,7 +28,7 @@ from hippodrome.sim.method_spec import MethodSpec
 CHILD: Final = "hippodrome.eval.contest.child"
 LENGTH: Final = struct.Struct("<Q")  # before each message: its length in bytes
 AnswerT = TypeVar("AnswerT", Mapped, Localized)
-LOOK_S: Final = 1.0  # between two looks at what memory it holds
+LOOK_S: Final = 1.0  # between two looks at what memory it holds, and what it keeps on disk
 CHUNK_BYTES: Final = 1 << 20
 
 
@@ -54,6 +54,7 @@ class Apart:
         self._limits = Limits.of(spec)
         self._stack = ExitStack()
         self._process: Process | None = None
+        self._looked_s = 0.0
 
     def close(self) -> None:
         """End the process; a later call begins another."""
@@ -74,13 +75,19 @@ class Apart:
         return None if self._process is None else self._process.peak_rss_bytes
 
     def _map(self, observations: Iterator[Observation], given: Given) -> Mapped:
+        self._watch(given.folder)
         made: tuple[Mapped, bool] = self._call("map", _sendable(given), observations)
         mapped, saves = made
         return replace(self._measured(mapped), save=self._save if saves else None)
 
     def _localize(self, observations: Iterator[Observation], given: Given) -> Localized:
+        self._watch(given.folder)
         localized: Localized = self._call("localize", _sendable(given), observations)
         return self._measured(localized)
+
+    def _watch(self, folder: Path) -> None:
+        """Let the limit of what it keeps on disk count what comes into a folder that it is given."""
+        (self._process or self._begin()).disk.watch(folder)
 
     def _measured(self, answer: AnswerT) -> AnswerT:
         """An answer with the memory that was seen here; what it says of its cost is looked at later."""
@@ -140,7 +147,7 @@ class Apart:
         """The next message. Raises MethodError if the process ends instead, or is past a limit."""
         assert process.popen.stdout is not None
         source, held, wanted = process.popen.stdout.fileno(), bytearray(), LENGTH.size
-        looked_s, head = time.monotonic(), True
+        head = True
         while len(held) < wanted:
             if select.select([source], [], [], POLL_S)[0]:
                 data = os.read(source, min(wanted - len(held), CHUNK_BYTES))
@@ -152,10 +159,9 @@ class Apart:
                     if wanted > self._limits.memory_bytes:
                         raise MethodError("it wrote to a file that it did not open, which is the harness's")
                     held.clear()
-                continue
             now_s = time.monotonic()
-            if now_s - looked_s > LOOK_S or process.left_s <= 0.0:
-                looked_s = now_s
+            if now_s - self._looked_s > LOOK_S or process.left_s <= 0.0:
+                self._looked_s = now_s
                 if process.poll():
                     raise self._ended(process)
         return bytes(held)

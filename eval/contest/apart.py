@@ -6,6 +6,7 @@ the user may read: it is trusted not to look for the truth.
 
 from __future__ import annotations
 
+import functools
 import os
 import pickle
 import select
@@ -20,12 +21,17 @@ from typing import Any, Final, TypeVar
 
 from hippodrome._folders import temporary_folder
 from hippodrome.core.types import FloatArray, Frame, Observation
+from hippodrome.eval.contest.declared import Declared
 from hippodrome.eval.contest.guard import Crashed
+from hippodrome.eval.contest.sources import method_sha256
 from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, MethodError
 from hippodrome.eval.programs.process import POLL_S, Limits, Process, started
+from hippodrome.eval.programs.references import search_here
 from hippodrome.sim.method_spec import MethodSpec
 
 CHILD: Final = "hippodrome.eval.contest.child"
+DECLARE: Final = "declare"  # what the process is asked for before an object is made: what the class says of itself
+IMPORT_LIMIT_S: Final = 120.0  # to import a class's module: the largest libraries take half a minute from a slow disk
 LENGTH: Final = struct.Struct("<Q")  # before each message: its length in bytes
 AnswerT = TypeVar("AnswerT", Mapped, Localized)
 LOOK_S: Final = 1.0  # between two looks at what memory it holds, and what it keeps on disk
@@ -176,6 +182,33 @@ class Apart:
         return MethodError(cause)
 
 
+def declaration_of(spec: MethodSpec, label: str) -> Declared:
+    """What a class declares, asked in a process of its own, so that nothing of it is imported here.
+
+    It is asked once for each state of its source.
+
+    Raises:
+        MethodError: There is no such class, it cannot be imported, or that takes longer than it may.
+    """
+    search_here()
+    return _asked(label, spec, method_sha256(spec), tuple(sys.path))
+
+
+@functools.cache
+def _asked(label: str, spec: MethodSpec, _sha256: str, _path: tuple[str, ...]) -> Declared:
+    limit_s = min(IMPORT_LIMIT_S, spec.time_limit_s)
+    asked = Apart(label, spec.model_copy(update={"time_limit_s": limit_s}))
+    try:
+        declared: Declared = asked._call(DECLARE, None)
+    except (MethodError, Crashed) as error:
+        if str(error).startswith("method "):
+            raise
+        raise MethodError(f"method {spec.class_}: importing its module: {error}") from None
+    finally:
+        asked.close()
+    return declared
+
+
 # By the names that the protocol has them under: a class that lacks a function has a stand-in that lacks it, too.
 FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "map": Apart._map,
@@ -185,9 +218,9 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
 }
 
 
-def apart(cls: type[Any], label: str, spec: MethodSpec) -> Apart:
+def apart(declared: Declared, label: str, spec: MethodSpec) -> Apart:
     """A stand-in for an object of a class, with those of the protocol's functions that the class has."""
-    functions = {name: function for name, function in FUNCTIONS.items() if hasattr(cls, name)}
+    functions = {name: FUNCTIONS[name] for name in declared.functions}
     stand_in: Apart = type("Apart", (Apart,), functions)(label, spec)
     return stand_in
 

@@ -17,11 +17,13 @@ from typing import IO, Any
 import numpy as np
 
 from hippodrome.core.types import FloatArray, Frame, HippodromeError, Observation
-from hippodrome.eval.contest.apart import LENGTH, Kept, Made
-from hippodrome.eval.contest.guard import crash_of, left_by, printable
+from hippodrome.eval.contest.apart import DECLARE, LENGTH, Kept, Made
+from hippodrome.eval.contest.declared import Declared, looked_at
+from hippodrome.eval.contest.guard import left_by
 from hippodrome.eval.contest.loading import load_class, made_of
 from hippodrome.eval.methods.feed import Feed
 from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, MethodError, as_estimate, as_mapped
+from hippodrome.eval.programs.references import crash_of, printable
 
 
 class Over(BaseException):
@@ -119,8 +121,11 @@ def main() -> None:
         while True:
             name, argument = request(source)
             try:
-                served = served or Served(made, source, sink)
-                value = getattr(served, name)(argument)
+                if name == DECLARE:
+                    value = _declared(made)
+                else:
+                    served = served or Served(made, source, sink)
+                    value = getattr(served, name)(argument)
             except Over:
                 raise
             except HippodromeError as error:
@@ -133,6 +138,12 @@ def main() -> None:
                 answer(sink, "done", value)
     except Over:
         return
+
+
+def _declared(made: Made) -> Declared:
+    """What the class declares; no object is made of it."""
+    assert made.spec.class_ is not None
+    return looked_at(made.spec.class_, made.spec.config, made.label)
 
 
 def _can_be_pickled(state: Any) -> bool:

@@ -7,6 +7,7 @@ the user may read: it is trusted not to look for the truth.
 from __future__ import annotations
 
 import functools
+import io
 import os
 import pickle
 import select
@@ -33,6 +34,10 @@ CHILD: Final = "hippodrome.eval.contest.child"
 DECLARE: Final = "declare"  # what the process is asked for before an object is made: what the class says of itself
 IMPORT_LIMIT_S: Final = 120.0  # to import a class's module: the largest libraries take half a minute from a slow disk
 LENGTH: Final = struct.Struct("<Q")  # before each message: its length in bytes
+SCRIBBLED: Final = "it wrote to a file that it did not open, which is the harness's"
+# Packages, and names of Python's own, whose objects answers may be made of.
+KNOWN_PACKAGES: Final = frozenset({"hippodrome", "numpy", "collections", "pathlib"})
+KNOWN_BUILTINS: Final = frozenset({"bytearray", "complex", "frozenset", "range", "set", "slice"})
 AnswerT = TypeVar("AnswerT", Mapped, Localized)
 LOOK_S: Final = 1.0  # between two looks at what memory it holds, and what it keeps on disk
 CHUNK_BYTES: Final = 1 << 20
@@ -48,8 +53,38 @@ class Made:
 
 
 @dataclass(frozen=True, slots=True)
+class Sealed:
+    """The state of a map, pickled: it goes from process to process, and what it is made of is not imported here."""
+
+    pickled: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class Kept:
     """Stands for the state of a map that stays in the method's own process."""
+
+
+class _Reader(pickle.Unpickler):
+    """Makes objects of types that the harness knows, so that no module of others is imported here."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        if module.partition(".")[0] in KNOWN_PACKAGES or (module == "builtins" and name in KNOWN_BUILTINS):
+            return super().find_class(module, name)
+        raise MethodError(
+            f"what it gave cannot be handed over: it holds a {module}.{name}; numbers, texts, lists and arrays are expected, and "
+            "Mapped.state for all else"
+        )
+
+
+def _unpickled(message: bytes) -> tuple[str, Any]:
+    """Kind and value of a message. Raises MethodError if it is none, or holds what the harness does not know."""
+    try:
+        kind, value = _Reader(io.BytesIO(message)).load()
+    except MethodError:
+        raise
+    except Exception:  # bytes that are no pickle raise nearly anything
+        raise MethodError(SCRIBBLED) from None
+    return kind, value
 
 
 class Apart:
@@ -121,7 +156,7 @@ class Apart:
         process.began_s = time.monotonic()
         self._send(process, message)
         while True:
-            kind, value = pickle.loads(self._received(process))
+            kind, value = _unpickled(self._received(process))
             if kind == "next":
                 assert observations is not None
                 self._send(process, pickle.dumps(next(observations, None), pickle.HIGHEST_PROTOCOL))
@@ -163,7 +198,7 @@ class Apart:
                 if head and len(held) == wanted:
                     wanted, head = LENGTH.unpack(held)[0], False
                     if wanted > self._limits.memory_bytes:
-                        raise MethodError("it wrote to a file that it did not open, which is the harness's")
+                        raise MethodError(SCRIBBLED)
                     held.clear()
             now_s = time.monotonic()
             if now_s - self._looked_s > LOOK_S or process.left_s <= 0.0:

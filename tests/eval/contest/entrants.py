@@ -113,6 +113,29 @@ class Gibberish:
     def map(self, observations, given):
         raise ValueError("\\udcff\\x1b[31m")
 
+class Remembers(Mapper):  # its state is of a class of its own
+    frame = "network"
+    def map(self, observations, given):
+        poses = np.array(list(super().map(observations, given)))
+        return Mapped(Trajectory(poses[:, 0], poses[:, 1:]), state=Memory(poses))
+    def localize(self, observations, given):
+        for one, pose in zip(observations, given.mapped.state.poses):
+            yield Answer(one.t_s, *pose[1:])
+
+class OnRemembers(Remembers):
+    builds_on = "first"
+    def map(self, observations, given):
+        assert type(given.base.state).__name__ == "Memory"
+        return given.base
+
+class Memory:
+    def __init__(self, poses):
+        self.poses = poses
+
+class Strange(Mapper):
+    def map(self, observations, given):
+        return Mapped(Trajectory(np.zeros(1), np.zeros((1, 3))), figures=dict(mine=Memory(1)))
+
 class Lambda(Mapper):
     def map(self, observations, given):
         return Mapped(Trajectory(np.zeros(1), np.zeros((1, 3))), figures=dict(mine=lambda: 1))

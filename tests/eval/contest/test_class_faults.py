@@ -28,6 +28,7 @@ pytestmark = pytest.mark.usefixtures("entrants")
         ("Speechless", "Silence: it cannot say why"),
         ("Gibberish", "ValueError: ??[31m"),
         ("Lambda", "cannot be handed over"),
+        ("Strange", "cannot be handed over: it holds a entrants.Memory"),
     ],
 )
 def test_whatever_it_does_wrong_is_in_its_row(materials, name, cause):

@@ -1,5 +1,6 @@
 """A Python class takes part: what it declares, what it is given, and its row."""
 
+import sys
 from contextlib import suppress
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 
 from hippodrome.eval.contest.apart import CHILD
 from hippodrome.eval.contest.entry import BUILT_IN, entries_of
+from hippodrome.eval.contest.perform import perform
 from hippodrome.eval.programs.containment import can_contain
 from hippodrome.sim.scenario import Scenario
 from tests.eval.contest.entrants import row_of
@@ -78,3 +80,12 @@ def test_ours_are_methods_like_everybody_s():
     assert all("map" in entry.does for entry in entries)
     assert [entry.method.label for entry in entries if "localize" in entry.does] == ["topometric (paper)", "topometric"]
     assert np.unique([entry.method.stem for entry in entries]).size == len(entries)
+
+
+def test_a_state_goes_to_whoever_builds_on_it_and_is_not_opened_here(materials, monkeypatch):
+    monkeypatch.delitem(sys.modules, "entrants", raising=False)
+    methods = {"first": "entrants:Remembers", "second": "entrants:OnRemembers"}
+    rows = perform(materials, entries_of(Scenario(name="circle", methods=methods))[-2:]).rows
+    assert [row.failure for row in rows] == [None, None]
+    assert rows[1].localization.success
+    assert "entrants" not in sys.modules

@@ -7,7 +7,7 @@ drive (``paper``: about half scale, some 60 deg of heading drift over 22 minutes
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Final, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Field
@@ -16,6 +16,7 @@ from hippodrome.core.types import FloatArray
 from hippodrome.sim.spec import Spec
 from hippodrome.sim.types import Drive
 
+UNIT: Final = ("units_per_metre", "units_per_metre_spread")  # fields that say in what unit speeds are, and whether that is known
 NonNegative: TypeAlias = Annotated[float, Field(ge=0.0)]
 
 
@@ -68,6 +69,13 @@ NoiseLevel: TypeAlias = Literal["clean", "paper", "realistic", "harsh"]
 def noise_of(level: NoiseLevel | SelfMotionNoise) -> SelfMotionNoise:
     """The named level, or the custom noise itself."""
     return level if isinstance(level, SelfMotionNoise) else NOISE_LEVELS[level]
+
+
+def at_level(level: NoiseLevel, noise: NoiseLevel | SelfMotionNoise) -> NoiseLevel | SelfMotionNoise:
+    """The errors of a level, with speeds in the unit of another noise, known or drawn; the level's name where that is its own."""
+    errors, given = NOISE_LEVELS[level], noise_of(noise)
+    unit = {name: getattr(given, name) for name in UNIT}
+    return level if unit == {name: getattr(errors, name) for name in UNIT} else errors.model_copy(update=unit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,12 +9,13 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 from hippodrome.core.types import StartPose
 from hippodrome.sim.geo_start import GeoStart
 from hippodrome.sim.renamed import present_value
 
+MAX_SEED: Final = 2**31 - 1
 DONE, THRESHOLD_FAILED, BAD_INPUT, OUR_FAULT, INTERRUPTED = 0, 1, 2, 70, 130
 
 Command: TypeAlias = Callable[[argparse.Namespace], int]  # takes the options and answers with the exit status
@@ -180,10 +181,7 @@ def _method(text: str) -> Any:
 
 def positive(text: str) -> int:
     """A whole number of at least 1."""
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{value} is less than 1")
-    return value
+    return whole_number(text, 1, None, "not a whole number of at least 1")
 
 
 def positive_number(text: str) -> float:
@@ -202,12 +200,20 @@ def number_within(text: str, least: float, most: float, what: str) -> float:
     return value
 
 
+def whole_number(text: str, least: int, most: int | None, what: str) -> int:
+    """A whole number from ``least`` to ``most`` or on. Raises ArgumentTypeError, which says that the text is ``what``."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = least - 1
+    if value < least or (most is not None and value > most):
+        raise argparse.ArgumentTypeError(f"'{text}' is {what}")
+    return value
+
+
 def seed(text: str) -> int:
     """A seed: SUMO takes 31 bits."""
-    value = int(text)
-    if not 0 <= value < 2**31:
-        raise argparse.ArgumentTypeError(f"{value} is not between 0 and 2147483647")
-    return value
+    return whole_number(text, 0, MAX_SEED, f"not a whole number from 0 to {MAX_SEED}")
 
 
 def start_pose(text: str) -> StartPose | GeoStart:

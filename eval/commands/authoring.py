@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, add_command, add_group
+from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, add_command, add_group, positive_number
 
 
 def add_scenario_command(commands: Any) -> None:
@@ -47,7 +47,9 @@ def add_scenario_command(commands: Any) -> None:
         help="cut a circle out of a large map, with this place in degrees as its middle (or xy:X,Y, in the metres of a SUMO "
              "network), written beside the scenario (default: all of the map)",
     )  # fmt: skip
-    new.add_argument("--radius", type=float, default=1000.0, metavar="METRES", help="of the circle of --around (default: 1000)")
+    new.add_argument(
+        "--radius", type=positive_number, default=1000.0, metavar="METRES", help="of the circle of --around (default: 1000)"
+    )
     new.add_argument("--out", type=Path, metavar="FILE", help="file for the scenario (default: NAME.yaml)")
 
     validate = add_command(

@@ -28,7 +28,12 @@ def add_truth(parser: argparse.ArgumentParser, default: str) -> None:
 
 def offset(text: str) -> float | str:
     """Seconds to add to a clock, or ``auto``."""
-    return text if text == "auto" else number_within(text, -1e11, 1e11, "neither auto nor a number of seconds")
+    return text if text == "auto" else seconds(text, "neither auto nor a number of seconds")
+
+
+def seconds(text: str, what: str = "not a number of seconds") -> float:
+    """Seconds to add to a clock."""
+    return number_within(text, -1e11, 1e11, what)
 
 
 def ahead(text: str) -> float | str:

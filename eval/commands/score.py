@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, positive_number
-from hippodrome.eval.commands.foreign import add_truth, ahead, metres_ahead
+from hippodrome.eval.commands.foreign import add_truth, ahead, metres_ahead, seconds
 
 
 def add_score_command(commands: Any) -> None:
@@ -63,7 +63,7 @@ def add_score_command(commands: Any) -> None:
     )  # fmt: skip
     add_truth(score, "the recording's own")
     score.add_argument(
-        "--time-offset", type=float, default=0.0, metavar="S", help="seconds to add to the times of --truth (default: 0)"
+        "--time-offset", type=seconds, default=0.0, metavar="S", help="seconds to add to the times of --truth (default: 0)"
     )
     score.add_argument(
         "--max-gap", type=positive_number, metavar="S",

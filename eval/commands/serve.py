@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, add_command
+from hippodrome.eval.commands.arguments import DONE, add_command, whole_number
 
 PORT = 8765
 
@@ -33,12 +33,7 @@ def add_serve_command(commands: Any) -> None:
 
 
 def _port(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number")
-    port = int(text)
-    if not 0 <= port < 65536:
-        raise argparse.ArgumentTypeError(f"{port} is not between 0 and 65535")
-    return port
+    return whole_number(text, 0, 65535, "not a whole number from 0 to 65535")
 
 
 def _serve(options: argparse.Namespace) -> int:

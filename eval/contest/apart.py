@@ -6,6 +6,8 @@ the user may read: it is trusted not to look for the truth.
 
 from __future__ import annotations
 
+import functools
+import io
 import os
 import pickle
 import select
@@ -20,15 +22,24 @@ from typing import Any, Final, TypeVar
 
 from hippodrome._folders import temporary_folder
 from hippodrome.core.types import FloatArray, Frame, Observation
+from hippodrome.eval.contest.declared import Declared
 from hippodrome.eval.contest.guard import Crashed
+from hippodrome.eval.contest.sources import method_sha256
 from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, MethodError
 from hippodrome.eval.programs.process import POLL_S, Limits, Process, started
+from hippodrome.eval.programs.references import search_here
 from hippodrome.sim.method_spec import MethodSpec
 
 CHILD: Final = "hippodrome.eval.contest.child"
+DECLARE: Final = "declare"  # what the process is asked for before an object is made: what the class says of itself
+IMPORT_LIMIT_S: Final = 120.0  # to import a class's module: the largest libraries take half a minute from a slow disk
 LENGTH: Final = struct.Struct("<Q")  # before each message: its length in bytes
+SCRIBBLED: Final = "it wrote to a file that it did not open, which is the harness's"
+# Packages, and names of Python's own, whose objects answers may be made of.
+KNOWN_PACKAGES: Final = frozenset({"hippodrome", "numpy", "collections", "pathlib"})
+KNOWN_BUILTINS: Final = frozenset({"bytearray", "complex", "frozenset", "range", "set", "slice"})
 AnswerT = TypeVar("AnswerT", Mapped, Localized)
-LOOK_S: Final = 1.0  # between two looks at what memory it holds
+LOOK_S: Final = 1.0  # between two looks at what memory it holds, and what it keeps on disk
 CHUNK_BYTES: Final = 1 << 20
 
 
@@ -42,8 +53,38 @@ class Made:
 
 
 @dataclass(frozen=True, slots=True)
+class Sealed:
+    """The state of a map, pickled: it goes from process to process, and what it is made of is not imported here."""
+
+    pickled: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class Kept:
     """Stands for the state of a map that stays in the method's own process."""
+
+
+class _Reader(pickle.Unpickler):
+    """Makes objects of types that the harness knows, so that no module of others is imported here."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        if module.partition(".")[0] in KNOWN_PACKAGES or (module == "builtins" and name in KNOWN_BUILTINS):
+            return super().find_class(module, name)
+        raise MethodError(
+            f"what it gave cannot be handed over: it holds a {module}.{name}; numbers, texts, lists and arrays are expected, and "
+            "Mapped.state for all else"
+        )
+
+
+def _unpickled(message: bytes) -> tuple[str, Any]:
+    """Kind and value of a message. Raises MethodError if it is none, or holds what the harness does not know."""
+    try:
+        kind, value = _Reader(io.BytesIO(message)).load()
+    except MethodError:
+        raise
+    except Exception:  # bytes that are no pickle raise nearly anything
+        raise MethodError(SCRIBBLED) from None
+    return kind, value
 
 
 class Apart:
@@ -54,6 +95,7 @@ class Apart:
         self._limits = Limits.of(spec)
         self._stack = ExitStack()
         self._process: Process | None = None
+        self._looked_s = 0.0
 
     def close(self) -> None:
         """End the process; a later call begins another."""
@@ -74,13 +116,19 @@ class Apart:
         return None if self._process is None else self._process.peak_rss_bytes
 
     def _map(self, observations: Iterator[Observation], given: Given) -> Mapped:
+        self._watch(given.folder)
         made: tuple[Mapped, bool] = self._call("map", _sendable(given), observations)
         mapped, saves = made
         return replace(self._measured(mapped), save=self._save if saves else None)
 
     def _localize(self, observations: Iterator[Observation], given: Given) -> Localized:
+        self._watch(given.folder)
         localized: Localized = self._call("localize", _sendable(given), observations)
         return self._measured(localized)
+
+    def _watch(self, folder: Path) -> None:
+        """Let the limit of what it keeps on disk count what comes into a folder that it is given."""
+        (self._process or self._begin()).disk.watch(folder)
 
     def _measured(self, answer: AnswerT) -> AnswerT:
         """An answer with the memory that was seen here; what it says of its cost is looked at later."""
@@ -108,7 +156,7 @@ class Apart:
         process.began_s = time.monotonic()
         self._send(process, message)
         while True:
-            kind, value = pickle.loads(self._received(process))
+            kind, value = _unpickled(self._received(process))
             if kind == "next":
                 assert observations is not None
                 self._send(process, pickle.dumps(next(observations, None), pickle.HIGHEST_PROTOCOL))
@@ -140,7 +188,7 @@ class Apart:
         """The next message. Raises MethodError if the process ends instead, or is past a limit."""
         assert process.popen.stdout is not None
         source, held, wanted = process.popen.stdout.fileno(), bytearray(), LENGTH.size
-        looked_s, head = time.monotonic(), True
+        head = True
         while len(held) < wanted:
             if select.select([source], [], [], POLL_S)[0]:
                 data = os.read(source, min(wanted - len(held), CHUNK_BYTES))
@@ -150,12 +198,11 @@ class Apart:
                 if head and len(held) == wanted:
                     wanted, head = LENGTH.unpack(held)[0], False
                     if wanted > self._limits.memory_bytes:
-                        raise MethodError("it wrote to a file that it did not open, which is the harness's")
+                        raise MethodError(SCRIBBLED)
                     held.clear()
-                continue
             now_s = time.monotonic()
-            if now_s - looked_s > LOOK_S or process.left_s <= 0.0:
-                looked_s = now_s
+            if now_s - self._looked_s > LOOK_S or process.left_s <= 0.0:
+                self._looked_s = now_s
                 if process.poll():
                     raise self._ended(process)
         return bytes(held)
@@ -170,6 +217,33 @@ class Apart:
         return MethodError(cause)
 
 
+def declaration_of(spec: MethodSpec, label: str) -> Declared:
+    """What a class declares, asked in a process of its own, so that nothing of it is imported here.
+
+    It is asked once for each state of its source.
+
+    Raises:
+        MethodError: There is no such class, it cannot be imported, or that takes longer than it may.
+    """
+    search_here()
+    return _asked(label, spec, method_sha256(spec), tuple(sys.path))
+
+
+@functools.cache
+def _asked(label: str, spec: MethodSpec, _sha256: str, _path: tuple[str, ...]) -> Declared:
+    limit_s = min(IMPORT_LIMIT_S, spec.time_limit_s)
+    asked = Apart(label, spec.model_copy(update={"time_limit_s": limit_s}))
+    try:
+        declared: Declared = asked._call(DECLARE, None)
+    except (MethodError, Crashed) as error:
+        if str(error).startswith("method "):
+            raise
+        raise MethodError(f"method {spec.class_}: importing its module: {error}") from None
+    finally:
+        asked.close()
+    return declared
+
+
 # By the names that the protocol has them under: a class that lacks a function has a stand-in that lacks it, too.
 FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "map": Apart._map,
@@ -179,9 +253,9 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
 }
 
 
-def apart(cls: type[Any], label: str, spec: MethodSpec) -> Apart:
+def apart(declared: Declared, label: str, spec: MethodSpec) -> Apart:
     """A stand-in for an object of a class, with those of the protocol's functions that the class has."""
-    functions = {name: function for name, function in FUNCTIONS.items() if hasattr(cls, name)}
+    functions = {name: FUNCTIONS[name] for name in declared.functions}
     stand_in: Apart = type("Apart", (Apart,), functions)(label, spec)
     return stand_in
 

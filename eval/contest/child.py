@@ -17,11 +17,13 @@ from typing import IO, Any
 import numpy as np
 
 from hippodrome.core.types import FloatArray, Frame, HippodromeError, Observation
-from hippodrome.eval.contest.apart import LENGTH, Kept, Made
-from hippodrome.eval.contest.guard import crash_of, left_by, printable
+from hippodrome.eval.contest.apart import DECLARE, LENGTH, Kept, Made, Sealed
+from hippodrome.eval.contest.declared import Declared, looked_at
+from hippodrome.eval.contest.guard import left_by
 from hippodrome.eval.contest.loading import load_class, made_of
 from hippodrome.eval.methods.feed import Feed
 from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, MethodError, as_estimate, as_mapped
+from hippodrome.eval.programs.references import crash_of, printable
 
 
 class Over(BaseException):
@@ -40,17 +42,17 @@ class Served:
     def map(self, given: Given) -> tuple[Mapped, bool]:
         """Its map of the observations that it is handed, without what can only live here, and whether it can be saved."""
         feed, began = Feed(self._observations()), process_time()
-        self._mapped = as_mapped(self._runner.map(iter(feed), given), self._label)
+        self._mapped = as_mapped(self._runner.map(iter(feed), _unsealed(given)), self._label)
         feed.settle()
         cost = self._mapped.cost or Cost(process_time() - began - feed.decoding_s, None, feed.step_s)
-        state = self._mapped.state if _can_be_pickled(self._mapped.state) else Kept()
-        return replace(self._mapped, state=state, save=None, cost=cost), self._mapped.save is not None
+        return replace(self._mapped, state=_sealed(self._mapped.state), save=None, cost=cost), self._mapped.save is not None
 
     def localize(self, given: Given) -> Localized:
         """Its answers to the observations that it is handed."""
         feed, began = Feed(self._observations()), process_time()
-        mapped = self._mapped if self._mapped is not None else given.mapped
-        found = self._runner.localize(iter(feed), replace(given, mapped=mapped))
+        opened = _unsealed(given)
+        mapped = self._mapped if self._mapped is not None else opened.mapped
+        found = self._runner.localize(iter(feed), replace(opened, mapped=mapped))
         if isinstance(found, Localized):
             return replace(found, answers=[as_estimate(one, self._label) for one in found.answers])
         answers = [as_estimate(one, self._label) for one in found]
@@ -119,8 +121,11 @@ def main() -> None:
         while True:
             name, argument = request(source)
             try:
-                served = served or Served(made, source, sink)
-                value = getattr(served, name)(argument)
+                if name == DECLARE:
+                    value = _declared(made)
+                else:
+                    served = served or Served(made, source, sink)
+                    value = getattr(served, name)(argument)
             except Over:
                 raise
             except HippodromeError as error:
@@ -135,12 +140,31 @@ def main() -> None:
         return
 
 
-def _can_be_pickled(state: Any) -> bool:
+def _declared(made: Made) -> Declared:
+    """What the class declares; no object is made of it."""
+    assert made.spec.class_ is not None
+    return looked_at(made.spec.class_, made.spec.config, made.label)
+
+
+def _sealed(state: Any) -> Any:
+    """A map's state as it leaves the process, or what says that it stays. Objects of ours, as refinements, are no secret."""
+    if state is None or type(state).__module__.partition(".")[0] == "hippodrome":
+        return state
     try:
-        pickle.dumps(state, pickle.HIGHEST_PROTOCOL)
+        return Sealed(pickle.dumps(state, pickle.HIGHEST_PROTOCOL))
     except Exception:
-        return False
-    return True
+        return Kept()
+
+
+def _unsealed(given: Given) -> Given:
+    """What is given, with the states of maps that other processes sealed."""
+    return replace(given, base=_opened(given.base), mapped=_opened(given.mapped))
+
+
+def _opened(mapped: Mapped | None) -> Mapped | None:
+    if mapped is None or not isinstance(mapped.state, Sealed):
+        return mapped
+    return replace(mapped, state=pickle.loads(mapped.state.pickled))
 
 
 if __name__ == "__main__":

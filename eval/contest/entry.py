@@ -12,7 +12,8 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from hippodrome.eval.contest.apart import Apart, apart
+from hippodrome.eval.contest.apart import Apart, apart, declaration_of
+from hippodrome.eval.contest.declared import Declared, declared_by
 from hippodrome.eval.contest.loading import load_class, made_of, require_config
 from hippodrome.eval.methods.method import ALIGNMENTS, METHODS, Method, stem_of
 from hippodrome.eval.methods.ours import DeadReckoning, SemiMetric, Topometric, TopometricPaper
@@ -109,8 +110,7 @@ def with_methods(scenario: Scenario, added: Sequence[Added]) -> Scenario:
         name = one.name
         if name is None:
             assert one.spec.class_ is not None
-            cls = load_class(one.spec.class_)
-            name = _card(str(getattr(cls, "label", cls.__name__)), "own").label
+            name = _card(declaration_of(one.spec, one.spec.class_.rpartition(":")[2]).label, "own").label
         if name in methods:
             raise MethodError(f"method {name}: there is one of this name already; give it another, NAME=...")
         methods[name] = one.spec
@@ -123,23 +123,30 @@ def entries_of(scenario: Scenario) -> list[Entry]:
     Raises:
         MethodError: A method cannot be loaded, or two have one name.
     """
-    ours = [_entry_of(cls, cls.card, made_of(cls, {}, scenario, cls.card.label), "hippodrome") for cls in BUILT_IN]
-    theirs = [_foreign(name, spec, scenario) for name, spec in scenario.methods.items()]
+    ours = [_ours(cls, cls.card, made_of(cls, {}, scenario, cls.card.label)) for cls in BUILT_IN]
+    theirs = [_foreign(name, spec) for name, spec in scenario.methods.items()]
     entries = [*ours, *theirs]
     _require_names(entries)
     return entries
 
 
-def _foreign(name: str, spec: MethodSpec, scenario: Scenario) -> Entry:
-    """The entry of a method that is not ours."""
+def _ours(cls: type[Any], method: Method, runner: Any) -> Entry:
+    """The entry of a method that comes with hippodrome."""
+    return _entry_of(declared_by(cls, method.label), method, runner, "hippodrome")
+
+
+def _foreign(name: str, spec: MethodSpec) -> Entry:
+    """The entry of a method that a scenario or the command line names."""
     if spec.class_ is None:
         return _program(name, spec)
-    cls = load_class(spec.class_)
-    method = _card(name, str(spec.frame or getattr(cls, "frame", "own")))
-    require_config(cls, spec.config, method.label)
     if spec.class_ in OFFERED.values():  # what it does is done by a process of its own
-        return replace(_entry_of(cls, method, made_of(cls, spec.config, None, method.label), "hippodrome"), apart=True)
-    return _entry_of(cls, method, apart(cls, method.label, spec), spec.class_)
+        cls = load_class(spec.class_)
+        method = _card(name, str(spec.frame or cls.frame))
+        require_config(cls, spec.config, name)
+        return replace(_ours(cls, method, made_of(cls, spec.config, None, name)), apart=True)
+    declared = declaration_of(spec, name)
+    method = _card(name, spec.frame or declared.frame)
+    return _entry_of(declared, method, apart(declared, name, spec), spec.class_)
 
 
 def _program(name: str, spec: MethodSpec) -> Entry:
@@ -169,11 +176,8 @@ def _card(label: str, frame: str) -> Method:
     return Method(stem, label, frame, stem, map_file=f"{stem}.pbstream")
 
 
-def _entry_of(cls: type[Any], method: Method, runner: Any, source: str) -> Entry:
-    needs = getattr(cls, "needs", Needs())
-    if not isinstance(needs, Needs):
-        raise MethodError(f"method {method.label}: its needs are a {type(needs).__name__}, not a hippodrome Needs")
-    entry = Entry(method, runner, needs, getattr(cls, "builds_on", None), source)
+def _entry_of(declared: Declared, method: Method, runner: Any, source: str) -> Entry:
+    entry = Entry(method, runner, declared.needs, declared.builds_on, source)
     if not entry.does:
         raise MethodError(f"method {method.label}: it has none of the functions map, localize and describe")
     return entry

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.methods.protocol import MethodError
+from hippodrome.eval.programs.references import crash_of, printable
 
 if TYPE_CHECKING:
     from hippodrome.eval.methods.materials import Materials
@@ -46,19 +45,3 @@ def guarded(label: str, function: Callable[[], ResultT], materials: Materials) -
 def left_by(error: SystemExit) -> str:
     """How a method left its process."""
     return printable(f"it left the process with status {0 if error.code is None else error.code}"[:200])
-
-
-def crash_of(error: BaseException) -> tuple[str, str]:
-    """What was raised and where, in one line, and the whole traceback."""
-    last = traceback.extract_tb(error.__traceback__)[-1]
-    try:
-        text = " ".join(str(error).split())[:200]
-    except Exception:  # its own words may be what is broken
-        text = "it cannot say why"
-    trace = "".join(traceback.format_exception(error))
-    return printable(f"crashed: {type(error).__name__}: {text} ({Path(last.filename).name}, line {last.lineno})"), trace
-
-
-def printable(text: str) -> str:
-    """A text of others, without what moves a terminal's cursor or cannot be written as UTF-8."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)

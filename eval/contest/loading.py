@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.contest.guard import crash_of
 from hippodrome.eval.methods.protocol import MethodError
+from hippodrome.eval.programs.references import object_of, said
 
 if TYPE_CHECKING:
     from hippodrome.sim.scenario import Scenario
@@ -19,25 +16,12 @@ if TYPE_CHECKING:
 
 def load_class(reference: str) -> type[Any]:
     """The class of ``module:Class``; the working directory is searched as well. Raises MethodError."""
-    module_name, _, class_name = reference.partition(":")
-    if str(Path.cwd()) not in sys.path:
-        sys.path.append(str(Path.cwd()))
     try:
-        found: Any = importlib.import_module(module_name)
-        for part in class_name.split("."):
-            found = getattr(found, part)
-    except ModuleNotFoundError as error:
-        raise MethodError(
-            f"method {reference}: there is no module '{error.name}'; install it, or run in the folder that has it"
-        ) from None
-    except AttributeError:
-        raise MethodError(f"method {reference}: the module has no '{class_name}'") from None
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # a script that is no module leaves the process when it is imported
-        raise MethodError(f"method {reference}: importing it failed: {_said(error)}") from error
+        found = object_of(reference)
+    except HippodromeError as error:
+        raise MethodError(f"method {reference}: {error}") from error
     if not isinstance(found, type):
-        raise MethodError(f"method {reference}: '{class_name}' is a {type(found).__name__}, not a class")
+        raise MethodError(f"method {reference}: that is a {type(found).__name__}, not a class")
     return found
 
 
@@ -50,12 +34,7 @@ def made_of(cls: type[Any], config: dict[str, Any], scenario: Scenario | None, l
     except HippodromeError:
         raise
     except Exception as error:
-        raise MethodError(f"method {label}: it cannot be made: {_said(error)}") from error
-
-
-def _said(error: BaseException) -> str:
-    """What was raised, in one line."""
-    return crash_of(error)[0].removeprefix("crashed: ")
+        raise MethodError(f"method {label}: it cannot be made: {said(error)}") from error
 
 
 def require_config(cls: type[Any], config: dict[str, Any], label: str) -> BaseModel | None:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import shlex
-from importlib.util import find_spec
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 from hippodrome._files import sha256_of
+from hippodrome.eval.programs.references import search_here
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.scenario import Scenario
 
@@ -27,11 +31,25 @@ def method_sha256(spec: MethodSpec) -> str:
 
 
 def _module_file(reference: str) -> Path | None:
-    try:
-        found = find_spec(reference.partition(":")[0])
-    except (ImportError, ValueError):
-        return None
+    """The file of a module; none of the packages that it lies in is imported for it, as that would run them."""
+    search_here()
+    name, places, found = "", None, None
+    for part in reference.partition(":")[0].split("."):
+        name = f"{name}.{part}" if name else part
+        found = _spec_of(name, places)
+        if found is None:
+            return None
+        places = found.submodule_search_locations
     return Path(found.origin) if found is not None and found.origin is not None else None
+
+
+def _spec_of(name: str, places: Sequence[str] | None) -> ModuleSpec | None:
+    """Where a module lies, by the first finder that knows it."""
+    for finder in sys.meta_path:
+        with suppress(ImportError, ValueError, AttributeError):  # an old finder has no such function
+            if (found := finder.find_spec(name, places)) is not None:
+                return found
+    return None
 
 
 def _words(command: str | None) -> list[str]:

@@ -7,12 +7,10 @@ action of Gymnasium.
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -22,6 +20,7 @@ from hippodrome.core.navigation.spaces import command_of, observed
 from hippodrome.core.navigation.types import Command, Radar
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, HippodromeError, Observation
+from hippodrome.eval.programs.references import object_of
 from hippodrome.proto import method_stream_pb2 as pb
 from hippodrome.proto.codec import load_map
 from hippodrome.proto.driving import command_message, goal_of, network_of, observation_of, radar_of
@@ -31,20 +30,8 @@ KINDS = "a class or an object with step(observation, radar), predict(observed), 
 
 
 def load(reference: str) -> Any:
-    """The object of ``module:Object``; the working directory is searched as well. Raises HippodromeError."""
-    module_name, _, name = reference.partition(":")
-    if str(Path.cwd()) not in sys.path:
-        sys.path.append(str(Path.cwd()))
-    try:
-        found: Any = importlib.import_module(module_name)
-        for part in name.split("."):
-            found = getattr(found, part)
-    except ModuleNotFoundError as error:
-        raise HippodromeError(f"there is no module '{error.name}'; install it, or run in the folder that has it") from None
-    except AttributeError:
-        raise HippodromeError(f"the module {module_name} has no '{name}'") from None
-    except Exception as error:
-        raise HippodromeError(f"importing {module_name} failed: {type(error).__name__}: {error}") from error
+    """The policy of ``module:Object``; the working directory is searched as well. Raises HippodromeError."""
+    found = object_of(reference)
     if not (hasattr(found, "step") or hasattr(found, "predict") or callable(found)):
         raise HippodromeError(f"{reference} is a {type(found).__name__}; a policy is {KINDS}")
     if isinstance(found, type) and not any(name in dir(found) for name in ("step", "predict", "__call__")):

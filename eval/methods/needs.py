@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from hippodrome.eval.methods.beforehand import UNITS
 from hippodrome.eval.methods.protocol import MethodError, Needs
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.scenario import Scenario
+
+KNOWN_UNIT: Final = "noise.units_per_metre_spread: 0"
 
 
 def camera_of(scenario: Scenario, drive: Recording) -> CameraSpec:
@@ -55,5 +59,6 @@ def require_met(needs: Needs, scenario: Scenario, drive: Recording) -> None:
     if needs.grain and not camera.grain and not foreign:  # what a real camera took has its grain
         raise MethodError("it needs frames with grain, and the drive was drawn without; set camera.grain: true in the scenario")
     if needs.metric_scale and metres_per_unit(scenario, drive) is None:
-        cure = "import it with --units" if foreign else "set noise.units_per_metre_spread: 0 in the scenario"
-        raise MethodError(f"it needs speeds whose unit is known, and this drive's is not; {cure}")
+        why = "nobody stated this drive's" if foreign else "this drive's is drawn at random, as a single camera's is"
+        cure = "import it with --units" if foreign else f"set {KNOWN_UNIT} in the scenario, its other errors beside it"
+        raise MethodError(f"it needs speeds whose unit is known, and {why}; {cure}")

@@ -10,21 +10,24 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, BinaryIO, Final
 
 from hippodrome._processes import dying_with_me
 from hippodrome.eval.methods.protocol import MethodError
 from hippodrome.eval.programs.containment import DEPTH, can_contain, contained
+from hippodrome.eval.programs.disk import Disk
+from hippodrome.eval.programs.family import descendant, family, peak_bytes, processes
 from hippodrome.sim.method_spec import MethodSpec
 
 MEGABYTE: Final = 1_000_000
 POLL_S: Final = 0.05  # between two looks at a process: its memory is looked at as well
 FIRST_POLL_S: Final = 0.001  # between the first ones: what ends at once has its memory looked at, too
 FILE_BYTES: Final = 4 << 30  # the longest file that a program may write, its printed text included
+TEMPORARY: Final = "temporary"  # folder in its own one for files that it makes where TMPDIR says
 LAST_WORDS: Final = 300  # characters of what a program printed last that an error quotes
 LEAST_WORK: Final = 0.02  # share of a core: a program that uses less of one for longer than its limit has stalled
 # Signals by which a program ends through a fault of its own. Not SIGKILL, by which the system ends it for want of memory.
@@ -45,12 +48,19 @@ class Limits:
 
     time_s: float
     memory_bytes: int  # address space of each process, and memory of all of them together
+    disk_bytes: int = 8_000 * MEGABYTE  # that it may keep on disk
     stall_s: float | None = None  # how long it may do no work: its threads wait for one another, say; None: for ever
 
     @classmethod
     def of(cls, spec: MethodSpec) -> Limits:
         """Those that a scenario sets for a method."""
-        return cls(spec.time_limit_s, round(spec.memory_limit_mb * MEGABYTE), spec.stall_limit_s)
+        memory_bytes, disk_bytes = (round(limit * MEGABYTE) for limit in (spec.memory_limit_mb, spec.disk_limit_mb))
+        return cls(spec.time_limit_s, memory_bytes, disk_bytes, spec.stall_limit_s)
+
+    @property
+    def file_bytes(self) -> int:
+        """The longest file that it may write."""
+        return min(FILE_BYTES, self.disk_bytes)
 
 
 @dataclass(slots=True)
@@ -60,6 +70,7 @@ class Process:
     popen: subprocess.Popen[bytes]
     limits: Limits
     log: Path  # what it prints, on standard error at least
+    disk: Disk  # what it keeps
     began_s: float = field(default_factory=time.monotonic)
     cpu_s: float = 0.0  # user and system time of it and of the processes that it waited for
     peak_rss_bytes: int | None = None  # None: it ended before it was seen
@@ -85,31 +96,24 @@ class Process:
                 self.stop(f"hung: no end after {self.limits.time_s:g} s, its limit")
             elif (held := self.look()) > self.limits.memory_bytes:
                 self.stop(f"took {held / 1e6:.0f} MB of memory, more than its limit of {self.limits.memory_bytes / 1e6:.0f} MB")
+            elif self.disk.is_due() and (cause := self._keeps_too_much(family(self.popen.pid, processes()))) is not None:
+                self.stop(cause)
             elif self.limits.stall_s is not None and self._stalls(self.limits.stall_s):
                 self.stalled = True
                 self.stop(f"hung: no work for {self.limits.stall_s:g} s")
             return self.status is not None
         self._ended(status, usage)
+        self.stopped = self._keeps_too_much()
         return True
 
     def cpu_now_s(self) -> float:
         """CPU time that it has taken so far, all its threads; the processes that it started are not counted until they end."""
         if self.program is None:
-            self.program = self._find() if self.contained else self.popen.pid
+            self.program = descendant(self.popen.pid, DEPTH) if self.contained else self.popen.pid
         try:
             return 0.0 if self.program is None else time.clock_gettime((~self.program << 3) | CPU_CLOCK)
         except OSError:  # it has just ended
             return self.cpu_s
-
-    def _find(self) -> int | None:
-        """The number of the program's own process; None while it is not there yet."""
-        found, family = self.popen.pid, _processes()
-        for _ in range(DEPTH):
-            children = [pid for pid, one in family.items() if one.parent == found]
-            if not children:
-                return None
-            found = min(children)
-        return found
 
     def _stalls(self, limit_s: float) -> bool:
         """Whether it has done no work for longer than ``limit_s``."""
@@ -123,21 +127,27 @@ class Process:
 
         The kernel's figure for a process that has ended (``ru_maxrss``) begins with the memory of the one that started it.
         """
-        held, processes = 0, _processes()
-        for pid in _family(self.popen.pid, processes):
-            held += processes[pid].held_bytes
-            if self.contained and self.popen.pid in (pid, processes[pid].parent):
+        held, running = 0, processes()
+        for pid in family(self.popen.pid, running):
+            held += running[pid].held_bytes
+            if self.contained and self.popen.pid in (pid, running[pid].parent):
                 continue  # the process that was started and its shell lead to the program and are not part of it
-            with contextlib.suppress(OSError, ValueError, IndexError):
-                peak = 1024 * int(Path(f"/proc/{pid}/status").read_text().split("VmHWM:")[1].split()[0])
+            if (peak := peak_bytes(pid)) > 0:
                 self.peak_rss_bytes = max(peak, self.peak_rss_bytes or 0)
         return held
+
+    def _keeps_too_much(self, pids: Iterable[int] = ()) -> str | None:
+        """What is to be said where it, or what it left, takes more of the disk than it may; None where it does not."""
+        limit, kept = self.disk.limit_bytes, self.disk.kept_bytes(pids)
+        if kept <= limit:
+            return None
+        return f"kept {kept / 1e6:.0f} MB on disk, more than its limit of {limit / 1e6:.0f} MB, disk_limit_mb"
 
     def stop(self, cause: str) -> None:
         """End it and its family, and remember why."""
         if self.status is None:
             self.stopped = cause
-            for pid in _family(self.popen.pid, _processes()):
+            for pid in family(self.popen.pid, processes()):
                 with contextlib.suppress(ProcessLookupError, PermissionError):
                     os.kill(pid, signal.SIGKILL)
             with contextlib.suppress(ProcessLookupError):
@@ -168,7 +178,9 @@ class Process:
             return None
         assert self.status is not None
         how = f"exit status {self.status}"
-        if self.status < 0:
+        if -self.status == signal.SIGXFSZ:
+            how = f"wrote a file of more than {self.limits.file_bytes / 1e6:.0f} MB, the limit"
+        elif self.status < 0:
             how = f"crashed: signal {-self.status} ({_signal_name(-self.status)})"
         return f"{how}; its last words: {last_words(self.log)}"
 
@@ -189,33 +201,36 @@ def started(
 
     Args:
         command: Its words. It is started in the working directory, so that it can be named by a relative path.
-        folder: Where ``log.txt`` with all that it prints goes.
+        folder: Where ``log.txt`` with all that it prints goes, and its temporary files. What it keeps there is watched.
         limits: What it may take.
         concealed: Folders that it shall not see, where the system allows that.
         fed: Whether its standard input and output are pipes; then only what it prints on standard error goes to the log.
 
     Raises:
-        MethodError: There is no such program, or it cannot be run.
+        MethodError: There is no such program, or it cannot be run; or what it left in its folder before is in the way.
     """
     log = folder / "log.txt"
     pipe = subprocess.PIPE if fed else subprocess.DEVNULL
-    with log.open("ab") as stream:
+    disk = Disk(limits.disk_bytes)
+    disk.watch(folder)
+    temporary = folder / TEMPORARY
+    with _appended(log, temporary) as stream:
         if shutil.which(command[0]) is None:
             raise MethodError(f"there is no program '{command[0]}', or it may not be run; name it by a path, and chmod +x it")
         words, within = [str(word) for word in command], can_contain()
         if within:
-            words = contained(words, concealed, limits.memory_bytes, FILE_BYTES)
+            words = contained(words, concealed, limits.memory_bytes, limits.file_bytes)
         try:
             popen = subprocess.Popen(
                 words, stdin=pipe, stdout=subprocess.PIPE if fed else stream, stderr=stream, start_new_session=True,
-                preexec_fn=dying_with_me(),
+                preexec_fn=dying_with_me(), env={**os.environ, "TMPDIR": str(temporary)},
             )  # fmt: skip
         except OSError as error:
             cure = "does it begin with #! and its interpreter?"
             raise MethodError(f"'{command[0]}' cannot be started: {error.strerror}; {cure}") from None
     if not within:
         _limit(popen.pid, limits)
-    process = Process(popen, limits, log, contained=within)
+    process = Process(popen, limits, log, disk, contained=within)
     process.look()
     try:
         yield process
@@ -225,32 +240,17 @@ def started(
             _close(end)
 
 
-@dataclass(frozen=True, slots=True)
-class _Running:
-    """A process of the system."""
-
-    parent: int
-    group: int
-    held_bytes: int
-
-
-def _processes() -> dict[int, _Running]:
-    """All processes, by their numbers."""
-    found = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            with contextlib.suppress(OSError, ValueError, IndexError):
-                fields = (entry / "stat").read_text().rpartition(")")[2].split()
-                found[int(entry.name)] = _Running(int(fields[1]), int(fields[2]), int(fields[21]) * resource.getpagesize())
-    return found
-
-
-def _family(head: int, processes: Mapping[int, _Running]) -> set[int]:
-    """The process ``head``, those of its group, and all that descend from them."""
-    found = {pid for pid, one in processes.items() if pid == head or one.group == head}
-    while more := {pid for pid, one in processes.items() if one.parent in found} - found:
-        found |= more
-    return found
+def _appended(log: Path, temporary: Path) -> BinaryIO:
+    """The log of a program, open for more, and beside it a folder for temporary files. Raises MethodError."""
+    try:
+        temporary.mkdir(exist_ok=True)
+        # What an earlier call put in its place is not followed, and not waited for.
+        handle = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600)
+    except OSError as error:
+        raise MethodError(
+            f"its folder cannot be used for another call: {error.strerror}; has it removed or replaced it?"
+        ) from None
+    return os.fdopen(handle, "ab")
 
 
 def command_words(text: str, **places: Path) -> list[str]:
@@ -269,7 +269,7 @@ def command_words(text: str, **places: Path) -> list[str]:
 def last_words(log: Path) -> str:
     """The last line that a program printed, shortened."""
     lines = []
-    with contextlib.suppress(OSError), log.open("rb") as stream:  # it may have taken the file away
+    with contextlib.suppress(OSError), os.fdopen(_unblocked(log), "rb") as stream:  # it may have taken the file away
         stream.seek(0, os.SEEK_END)
         stream.seek(max(stream.tell() - 4096, 0))
         lines = stream.read().decode(errors="replace").splitlines()
@@ -277,11 +277,16 @@ def last_words(log: Path) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in found)[:LAST_WORDS]
 
 
+def _unblocked(path: Path, flags: int = os.O_RDONLY) -> int:
+    """Open a file without following a link or waiting for its other end: a program may have put anything there."""
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600)
+
+
 def _limit(pid: int, limits: Limits) -> None:
     """Limits of the system for a process that has just begun; it and its children keep them."""
     with contextlib.suppress(ProcessLookupError, PermissionError, ValueError):
         resource.prlimit(pid, resource.RLIMIT_AS, (limits.memory_bytes, limits.memory_bytes))
-        resource.prlimit(pid, resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (limits.file_bytes, limits.file_bytes))
         resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0))
 
 

@@ -188,7 +188,8 @@ class Line:
         end_s = time.monotonic() + 2.0
         while not self._process.poll() and time.monotonic() < end_s:
             time.sleep(POLL_S / 10.0)
-        cause = self._process.failure()
+        if (cause := self._process.failure()) is None and self._process.status is None:
+            cause = f"it closed its standard input or output, and went on; its last words: {last_words(self._process.log)}"
         raise self._process.error(cause or f"it ended before the drive did; its last words: {last_words(self._process.log)}")
 
 

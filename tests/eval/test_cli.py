@@ -70,6 +70,19 @@ def test_an_argument_says_what_it_is_and_what_it_is_without_being_given(words):
 
 
 @EVERY
+@pytest.mark.parametrize("text", ["?!", "", "-1e999", "nan", "9" * 5000])
+def test_a_value_that_cannot_be_read_is_answered_with_what_is_wanted(words, text):
+    for action in arguments(PARSERS[words]):
+        if action.type in (None, Path) or action.choices:  # argparse names the choices itself
+            continue
+        try:
+            action.type(text)
+        except argparse.ArgumentTypeError as error:
+            assert " is n" in str(error), action.dest  # is not, is neither, is none of
+            assert repr(text)[1:40] in str(error), action.dest
+
+
+@EVERY
 def test_examples_are_commands_that_exist(words):
     for line in examples(PARSERS[words]):
         before_redirection = shlex.split(line.split(" > ")[0])

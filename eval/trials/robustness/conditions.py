@@ -10,6 +10,7 @@ from hippodrome.core.localization.beliefs.config import VISUAL_NOISE
 from hippodrome.core.types import HippodromeError
 from hippodrome.core.views.config import CameraGeometry
 from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.self_motion import NoiseLevel, at_level
 from hippodrome.sim.traffic_spec import TrafficSpec
 
 Change: TypeAlias = Callable[[Scenario], Scenario]
@@ -73,9 +74,9 @@ def _askew(offset_deg: float) -> Change:
     return change
 
 
-def _self_motion(level: str) -> Change:
-    """Self-motion with the errors of another noise level."""
-    return lambda scenario: _seen()(scenario).model_copy(update={"noise": level})
+def _self_motion(level: NoiseLevel) -> Change:
+    """Self-motion with the errors of another noise level, in the scenario's unit."""
+    return lambda scenario: _seen()(scenario).model_copy(update={"noise": at_level(level, scenario.noise)})
 
 
 def _visual(scenario: Scenario) -> Scenario:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from matplotlib.lines import Line2D
 
 from hippodrome.eval.figures.style import ERROR_MAP, SERIES, TRUTH, VERMILION, Axes, new_figure, save_figure, tidy
-from hippodrome.eval.trials.robustness.recall import PRECISION, PlaceResult, curve
+from hippodrome.eval.trials.robustness.recall import PRECISION, PlaceResult, curve, recogniser_names
 from hippodrome.eval.trials.robustness.sequences import ConditionResult, SequenceResult
 
 ERROR_RANGE_M: Final = (0.2, 20.0)  # range of the heat map's colours: below is the map's own error, above is a false fix
 DARK_M: Final = 2.0  # mean errors above this are drawn dark, with white text upon them: the upper half of the colours
+STYLES: Final = ("-", "--", ":")  # of the lines, once there are more of them than colours
 CURVE_COLUMNS: Final = 4  # panels beside one another in the figure of the curves
 
 
@@ -45,22 +48,24 @@ def draw_heat_map(path: Path, name: str, results: Sequence[ConditionResult]) -> 
 
 def draw_curves(path: Path, name: str, results: Sequence[PlaceResult]) -> None:
     """Precision over recall of each recogniser, a panel for each condition."""
+    styles = dict(zip(recogniser_names(results), product(STYLES, SERIES), strict=False))
     columns = min(CURVE_COLUMNS, len(results))
     rows = -(-len(results) // columns)
     figure = new_figure(max(7.0, 2.6 * columns), 2.2 * rows + 0.6)
     panels = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
     for axes in panels[len(results) :]:
         axes.set_visible(False)
+    lines: dict[str, Line2D] = {}
     for axes, result in zip(panels, results, strict=False):
-        for answers, colour in zip(result.answers, SERIES, strict=False):
-            found = curve(answers)
-            axes.plot(100 * found.recall, 100 * found.precision, color=colour, linewidth=1.4, label=answers.method)
+        for answers in result.answers:
+            found, (style, colour) = curve(answers), styles[answers.method]
+            percent = 100 * found.recall, 100 * found.precision
+            lines[answers.method] = axes.plot(*percent, color=colour, linewidth=1.4, linestyle=style)[0]
         axes.axhline(100 * PRECISION, color="#777777", linewidth=0.6, linestyle=":")
         tidy(axes, "recall (%)", "precision (%)", result.condition)
         axes.set_xlim(0, 101)
         axes.set_ylim(50, 101)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8, frameon=False)
+    figure.legend(lines.values(), lines, loc="outside lower center", ncols=len(lines), fontsize=8, frameon=False)
     figure.suptitle(f"{name}: place recognition alone", x=0.01, ha="left", fontsize=10)
     save_figure(figure, path, for_print=True)
 

@@ -16,6 +16,7 @@ from hippodrome.eval.contest.guard import guarded
 from hippodrome.eval.contest.places import vector_of
 from hippodrome.eval.contest.trials import Localizer, added_methods, localizer_of
 from hippodrome.eval.methods.materials import Materials, gather
+from hippodrome.eval.methods.needs import require_met
 from hippodrome.eval.methods.protocol import MethodError
 from hippodrome.eval.metrics.localization import score_localization
 from hippodrome.eval.metrics.mapped_road import split_by_map
@@ -83,23 +84,25 @@ def try_method(task: MethodTask) -> Tried:
 
 def describe_places(
     scenario: Scenario, cognitive_map: CognitiveMap, mapping: Recording, queries: Queries, out: Path
-) -> tuple[Answers, ...]:
+) -> tuple[tuple[Answers, ...], dict[str, str]]:
     """The answers of all methods that describe views, to the queries that ours answers, about the same places.
 
     A query's place is the one whose vector is nearest; how far it stands out from the best one elsewhere says how sure it is.
-    A method that fails has no answers: the cause is printed.
+    A method that fails has no answers: its label and the cause are in what is returned beside them.
     """
     steps, places_m = places_of(cognitive_map, mapping)
     frames = [mapping.frame(int(mapping.samples.frame[step])) for step in steps]
-    materials, found = gather(scenario, out), []
+    materials, found, failed = gather(scenario, out), [], {}
     for entry in added_methods(scenario, "describe"):
         try:
+            require_met(entry.needs, scenario, mapping)
             found.append(_described(entry, frames, places_m, queries, materials))
         except HippodromeError as error:
+            failed[entry.method.label] = str(error)
             print(f"{scenario.name}: {entry.method.label}: place recognition: {error}", flush=True)
         finally:
             entry.close()
-    return tuple(found)
+    return tuple(found), failed
 
 
 def _described(entry: Entry, frames: Sequence[Frame], places_m: FloatArray, queries: Queries, materials: Materials) -> Answers:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
 import numpy as np
@@ -35,16 +35,24 @@ class PlaceResult:
 
     condition: str
     answers: tuple[Answers, ...]
+    failed: Mapping[str, str] = field(default_factory=dict)  # labels of the methods without answers, and why
 
     def summary(self) -> dict[str, Any]:
-        """How many queries there were and, for each recogniser, its figures; as plain data."""
+        """How many queries there were and, for each recogniser, its figures or why it has none; as plain data."""
         mapped = self.answers[0].mapped
         return {
             "condition": self.condition,
             "looks": len(mapped),
             "mapped": int(mapped.sum()),
             "recognisers": {one.method: _figures(one) for one in self.answers},
+            **({"failed_methods": dict(self.failed)} if self.failed else {}),
         }
+
+
+def recogniser_names(results: Sequence[PlaceResult]) -> list[str]:
+    """All recognisers, those that failed under some conditions or under all of them included, in the order of the tables."""
+    answered = [one.method for result in results for one in result.answers]
+    return list(dict.fromkeys([*answered, *(label for result in results for label in result.failed)]))
 
 
 def curve(answers: Answers, strict: bool = False) -> Curve:
@@ -66,18 +74,19 @@ def recall_at(found: Curve, precision: float = PRECISION) -> float:
 
 
 def side_by_side(results: Sequence[PlaceResult]) -> PlaceResult:
-    """One condition's answers in several towns as if all had been given in one, so that one threshold holds for all."""
-    in_all = set.intersection(*({one.method for one in result.answers} for result in results))  # a method may fail in one town
-    by_method = zip(*([one for one in result.answers if one.method in in_all] for result in results), strict=True)
-    return PlaceResult(results[0].condition, tuple(map(_concatenated, by_method)))
+    """One condition's answers in several towns as if all had been given in one, so that one threshold holds for all.
+
+    A method that failed in one of the towns has failed in all together.
+    """
+    failed = {label: f"in town {number}: {why}" for number, one in enumerate(results, 1) for label, why in one.failed.items()}
+    by_method = zip(*([one for one in result.answers if one.method not in failed] for result in results), strict=True)
+    return PlaceResult(results[0].condition, tuple(map(_concatenated, by_method)), failed)
 
 
 def _concatenated(answers: Sequence[Answers]) -> Answers:
     """One recogniser's answers in all towns."""
     arrays = {
-        field.name: np.concatenate([getattr(one, field.name) for one in answers])
-        for field in fields(Answers)
-        if field.name != "method"
+        one.name: np.concatenate([getattr(part, one.name) for part in answers]) for one in fields(Answers) if one.name != "method"
     }
     return Answers(answers[0].method, **arrays)
 

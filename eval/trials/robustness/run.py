@@ -172,8 +172,8 @@ def _recognise(task: ConditionTask) -> PlaceResult:
     mapping = finish(RecordingPlan(task.mapped, "mapping", task.out))
     cognitive_map, config = half_known(load_map(map_path(task.mapped, task.out))[0]), task.scenario.localizer
     queries = queries_of(drive, config)
-    others = describe_places(task.mapped, cognitive_map, mapping, queries, task.out)
-    return PlaceResult(task.name, (*recognise(cognitive_map, mapping, queries, config), *others))
+    others, failed = describe_places(task.mapped, cognitive_map, mapping, queries, task.out)
+    return PlaceResult(task.name, (*recognise(cognitive_map, mapping, queries, config), *others), failed)
 
 
 def _kidnap(task: ConditionTask) -> tuple[Kidnapping, ...]:

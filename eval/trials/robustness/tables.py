@@ -12,7 +12,7 @@ from hippodrome.eval.trials.robustness.kidnapping import DEFINITION as KIDNAPPIN
 from hippodrome.eval.trials.robustness.kidnapping import Kidnapping, kidnapping_summary
 from hippodrome.eval.trials.robustness.paper_lengths import PaperSequence, paper_record, paper_summary
 from hippodrome.eval.trials.robustness.recall import DEFINITION as RECALL_DEFINITION
-from hippodrome.eval.trials.robustness.recall import PlaceResult
+from hippodrome.eval.trials.robustness.recall import PlaceResult, recogniser_names
 from hippodrome.eval.trials.robustness.sequences import DEFINITION, ELSEWHERE, WITHIN_M, ConditionResult, pooled
 from hippodrome.eval.trials.robustness.targets import Target, worst
 
@@ -52,16 +52,20 @@ def yardsticks_markdown(results: Sequence[ConditionResult], failed: Mapping[str,
 
 
 def places_markdown(results: Sequence[PlaceResult]) -> str:
-    """Place recognition: one row a condition, one column a recogniser."""
-    rows = []
+    """Place recognition: one row a condition, one column a recogniser. Below it, why a method has no figure in a row."""
+    rows, names = [], recogniser_names(results)
     for result in results:
         row = result.summary()
-        recalls = [
-            f"{100 * figures['recall']:.0f} % ({100 * figures['recall_strict']:.0f} %)" for figures in row["recognisers"].values()
-        ]
+        recalls = ["failed" if name in result.failed else _recalls(row["recognisers"].get(name)) for name in names]
         rows.append([result.condition, f"{row['looks']} ({row['mapped']})", *recalls])
-    head = ["condition", "looks (mapped)", *(one.method for one in results[0].answers)]
-    return _part("## Place recognition alone", table(head, rows, align="left"), f"{RECALL_DEFINITION} In brackets: strict.")
+    why = [f"- {label}, {result.condition}: {cause}" for result in results for label, cause in result.failed.items()]
+    definition = "\n".join([f"{RECALL_DEFINITION} In brackets: strict.", *(["", *why] if why else [])])
+    return _part("## Place recognition alone", table(["condition", "looks (mapped)", *names], rows, align="left"), definition)
+
+
+def _recalls(figures: Mapping[str, float] | None) -> str:
+    """A recogniser's cell under one condition; ``figures`` are None where it was not asked."""
+    return NONE if figures is None else f"{100 * figures['recall']:.0f} % ({100 * figures['recall_strict']:.0f} %)"
 
 
 def kidnapping_markdown(kidnapped: Mapping[str, Sequence[Kidnapping]]) -> str:

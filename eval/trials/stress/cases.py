@@ -11,7 +11,7 @@ from typing import Final
 from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
 from hippodrome.sim.scenario import Scenario
-from hippodrome.sim.self_motion import NOISE_LEVELS, NoiseLevel, SelfMotionNoise
+from hippodrome.sim.self_motion import NoiseLevel, SelfMotionNoise, at_level, noise_of
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.town import CONVERT_OPTIONS
 from hippodrome.sim.town_spec import TownSpec
@@ -43,9 +43,9 @@ class StressCase:
         """Whether it changes our own map, which other methods are not given, and nothing else."""
         return self.false_closures > 0.0 and self.name != "paper"
 
-    def self_motion(self) -> SelfMotionNoise:
-        """The errors that the self-motion is sensed with."""
-        level = NOISE_LEVELS[self.noise]
+    def self_motion(self, noise: NoiseLevel | SelfMotionNoise = "paper") -> SelfMotionNoise:
+        """The errors that the self-motion is sensed with, in the unit of the scenario's ``noise``."""
+        level = noise_of(at_level(self.noise, noise))
         changed: dict[str, float] = {"scale_jump": max(self.scale_jump, level.scale_jump)}
         if self.gyro_bias_degps is not None:
             changed["gyro_bias_degps"] = self.gyro_bias_degps

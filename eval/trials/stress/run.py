@@ -30,7 +30,7 @@ from hippodrome.eval.trials.stress.table import stress_markdown
 from hippodrome.eval.trials.stress.trial import StressedDrive, run_case, run_method
 from hippodrome.sim.record import RecordingPlan, finish
 from hippodrome.sim.scenario import Scenario
-from hippodrome.sim.self_motion import NoiseLevel
+from hippodrome.sim.self_motion import NoiseLevel, at_level
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +161,9 @@ def _tasks(
             groups.setdefault((case.noise, case.self_similar), []).append(case)
     return [
         StressTask(
-            (in_self_similar_grid(scenario, out) if grid else scenario).model_copy(update={"noise": level}),
+            (in_self_similar_grid(scenario, out) if grid else scenario).model_copy(
+                update={"noise": at_level(level, scenario.noise)}
+            ),
             tuple(group),
             out,
             path,

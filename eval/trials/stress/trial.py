@@ -61,7 +61,7 @@ def run_case(case: StressCase, drive: StressedDrive, rerun: str) -> StressRow:
     """
     warm_up()
     scenario = drive.scenario
-    semi_metric = drive.map_under(case.self_motion())
+    semi_metric = drive.map_under(case.self_motion(scenario.noise))
     rng = np.random.default_rng([scenario.seed, 4])
     semi_metric = with_false_closures(semi_metric, case.false_closures, rng)
     survey_error_m = max(case.survey_error_m, NOISE_LEVELS[case.noise].survey_error_m)
@@ -92,7 +92,7 @@ def run_method(case: StressCase, drive: StressedDrive, entry: Entry, rerun: str)
     """
     warm_up()
     scenario, recording = drive.scenario, drive.recording
-    sensed = sensed_anew(recording, case.self_motion(), np.random.default_rng([scenario.seed, 3]))
+    sensed = sensed_anew(recording, case.self_motion(scenario.noise), np.random.default_rng([scenario.seed, 3]))
     survey_error_m = max(case.survey_error_m, NOISE_LEVELS[case.noise].survey_error_m)
     roads = _roads_under(case, drive, survey_error_m, np.random.default_rng([scenario.seed, 4]))
     materials = Materials(scenario, drive.towns_folder.parent / scenario.name, drive.town, roads, sensed, sensed)

@@ -8,6 +8,7 @@ import pytest
 from hippodrome.core import se2
 from hippodrome.core.types import Observation, Trajectory
 from hippodrome.sim.scenario import Scenario
+from tests.eval.contest.entrants import ENTRANTS
 
 STEP_S, STEPS, SPEED_MPS, RADIUS_M = 0.1, 600, 5.0, 40.0
 
@@ -52,3 +53,11 @@ def materials(tmp_path):
     return SimpleNamespace(scenario=Scenario(name="circle"), folder=folder, mapping=drive, drive=drive, roads="the roads",
                            duration_s=STEPS * STEP_S, truth_folders=(recordings, folder),
                            provenance=lambda method: {"method": method.label})  # fmt: skip
+
+
+@pytest.fixture
+def entrants(tmp_path, monkeypatch):
+    """The module of that name with the classes of ``ENTRANTS``, where modules are looked for."""
+    (tmp_path / "entrants.py").write_text(ENTRANTS)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)

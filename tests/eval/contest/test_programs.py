@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import hippodrome.eval.programs.process
 from hippodrome.eval.contest.entry import Added, entries_of, with_methods
 from hippodrome.eval.contest.perform import perform
 from hippodrome.eval.programs.containment import can_contain
@@ -133,6 +134,36 @@ def test_a_program_that_eats_memory_is_stopped(row):
 def test_several_processes_that_eat_memory_together_are_stopped(row):
     text = "import os, time\nfor _ in range(4):\n    os.fork()\nheld = bytearray(30_000_000)\ntime.sleep(30)\n"
     assert "more than its limit of 300 MB" in row(python(text), memory_limit_mb=300, time_limit_s=20).failure
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "#!/bin/sh\nfor i in 1 2 3 4 5 6 7 8; do head -c 5000000 /dev/zero > $2/$i; done; sleep 60\n",
+        "#!/bin/sh\nfor i in 1 2 3 4 5 6 7 8; do head -c 5000000 /dev/zero > $2/$i; done\n",  # it ends before anybody looks
+        "#!/bin/sh\nfor i in 1 2 3 4 5 6 7 8; do head -c 5000000 /dev/zero > $TMPDIR/$i; done\n",
+        "#!/bin/sh\nexec 3> $2/a; exec 4> $2/b; rm $2/a $2/b\n"  # files without a name
+        "head -c 19000000 /dev/zero >&3; head -c 19000000 /dev/zero >&4; sleep 60\n",
+    ],
+)
+def test_a_program_that_fills_the_disk_is_stopped_and_the_limit_named(row, text):
+    found = row(text, disk_limit_mb=20.0, time_limit_s=30.0).failure
+    assert "MB on disk, more than its limit of 20 MB, disk_limit_mb" in found
+
+
+def test_no_file_is_longer_than_the_limit(row, monkeypatch):
+    monkeypatch.setattr(hippodrome.eval.programs.process, "FILE_BYTES", 20_000_000)
+    text = "#!/bin/sh\nexec head -c 40000000 /dev/zero > $2/a\n"
+    assert "wrote a file of more than 20 MB, the limit" in row(text).failure
+
+
+def test_a_log_that_is_replaced_by_what_never_ends_holds_nobody_up(row):
+    text = "#!/bin/sh\nrm $(dirname $2)/log.txt; mkfifo $(dirname $2)/log.txt; exit 3\n"
+    assert row(text).failure == "exit status 3; its last words: none"
+    text = python("import sys\nif len(sys.argv) > 3:\n    sys.exit('a second call')\n" + INTEGRATE)
+    text += "import os\nlog = os.path.dirname(out) + '/log.txt'\nos.remove(log)\nos.mkfifo(log)\n"
+    found = row(text, frame="network", localize="./program {sequence} {out} {map}")
+    assert "its folder cannot be used for another call" in found.failure
 
 
 def test_a_program_that_is_not_there_is_named(row):

@@ -134,6 +134,8 @@ def test_a_client_corrects_its_trajectory_in_the_end_and_localizes_in_what_it_ke
         ("import sys\nsys.stdout.buffer.write(bytes([255, 255, 255, 127]))\nsys.stdin.read()\n", "the limit is 67108864"),
         ("import os, signal\nos.kill(os.getpid(), signal.SIGABRT)\n", "signal 6 (SIGABRT)"),
         ("import sys\nsys.stdin.read()\n", "hung"),
+        ("import os, time\nos.close(1)\ntime.sleep(1000)\n", ""),  # where it has no namespace, that is seen at once
+        (FRAMES + "answer(FromMethod(ready=Ready(version=1)))\nwhile True: answer(FromMethod(answer=Answer(known=True)))\n", ""),
         (FRAMES + "answer(FromMethod(ready=Ready(version=7)))\nsys.stdin.read()\n", "it speaks version 7 of the stream"),
         (FRAMES + "answer(FromMethod(answer=Answer()))\nsys.stdin.read()\n", "answered with 'answer' where 'ready'"),
         (FRAMES + "answer(FromMethod(ready=Ready(version=1)))\n", "it ended before the drive did"),

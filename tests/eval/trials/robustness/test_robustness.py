@@ -23,6 +23,7 @@ from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import Recording
 from hippodrome.sim.scenario import DriveSpec, Scenario
 from hippodrome.sim.scene.conditions_spec import Conditions
+from hippodrome.sim.self_motion import SelfMotionNoise
 from hippodrome.sim.tour_spec import TourSpec
 
 SCENARIO = Scenario(
@@ -73,6 +74,13 @@ def test_every_condition_differs_from_same_and_is_a_valid_scenario():
     for name in CONDITIONS:
         assert name == SAME or differences(changed(SAME), changed(name))
         Scenario.model_validate(changed(name))
+
+
+def test_another_level_of_noise_leaves_the_unit_of_the_speeds():
+    metres = SCENARIO.model_copy(update={"noise": SelfMotionNoise(units_per_metre=1.0, units_per_metre_spread=0.0)})
+    for name in (name for name in CONDITIONS if name.startswith("self-motion")):
+        noise = CONDITIONS[name](metres).self_motion_noise
+        assert (noise.units_per_metre, noise.units_per_metre_spread) == (1.0, 0.0)
 
 
 def test_unknown_conditions_are_refused():

@@ -5,11 +5,12 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from hippodrome.core.types import EdgeKind, HippodromeError
-from hippodrome.eval.trials.stress.cases import CASES, chosen_cases, in_self_similar_grid
+from hippodrome.eval.trials.stress.cases import CASES, StressCase, chosen_cases, in_self_similar_grid
 from hippodrome.eval.trials.stress.perturbations import with_false_closures, without_roads
 from hippodrome.eval.trials.stress.rows import StressRow
 from hippodrome.eval.trials.stress.table import stress_markdown
 from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.self_motion import NOISE_LEVELS, SelfMotionNoise, at_level
 from hippodrome.sim.town import build_town
 from tests.core.synthetic import grid_network, semi_metric_drive
 
@@ -75,6 +76,14 @@ def test_cases_of_one_self_motion_share_a_map_and_unknown_names_are_refused():
     assert len({case.self_motion().model_dump_json() for case in CASES}) == 5
     with pytest.raises(HippodromeError, match="no stress case 'rain'"):
         chosen_cases(["paper", "rain"])
+
+
+def test_a_case_changes_the_errors_and_leaves_the_unit_of_the_speeds_that_a_scenario_states():
+    stated = SelfMotionNoise(units_per_metre=1.0, units_per_metre_spread=0.0, speed_noise=0.5)
+    found = StressCase("harsh", noise="harsh").self_motion(stated)
+    assert (found.units_per_metre, found.units_per_metre_spread) == (1.0, 0.0)
+    assert (found.speed_noise, found.gyro_gain) == (NOISE_LEVELS["harsh"].speed_noise, NOISE_LEVELS["harsh"].gyro_gain)
+    assert at_level("harsh", "clean") == at_level("harsh", SelfMotionNoise(speed_noise=0.5)) == "harsh"
 
 
 def test_the_self_similar_grid_is_one(tmp_path):

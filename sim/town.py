@@ -22,7 +22,7 @@ from hippodrome.core.types import FloatArray, HippodromeError
 from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
 from hippodrome.sim.map_import import LEFT_HAND, sumo_network
-from hippodrome.sim.net_file import SumoNet, check_places_to_wait, is_left_hand, load_net
+from hippodrome.sim.net_file import SumoNet, check_places_to_wait, is_left_hand, load_net, many_objects
 from hippodrome.sim.net_heights import crossings_without_height, lane_heights_m
 from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import road_network
@@ -85,6 +85,7 @@ def _check_side(choice: Choice, left_hand: bool, network: Path) -> None:
         )
 
 
+@many_objects()
 def read_town(net_file: Path, name: str | None = None) -> Town:
     """A town from a SUMO network file, checked."""
     net = load_net(net_file)

@@ -138,7 +138,8 @@ def _sides(**tags):
 def _relation(number, kind, start, via, end):
     members = f'<member type="way" ref="{start}" role="from"/><member type="node" ref="{via}" role="via"/>'
     members += f'<member type="way" ref="{end}" role="to"/>'
-    return f'<relation id="{number}" version="1">{members}<tag k="type" v="restriction"/><tag k="restriction" v="{kind}"/></relation>'
+    tags = f'<tag k="type" v="restriction"/><tag k="restriction" v="{kind}"/>'
+    return f'<relation id="{number}" version="1">{members}{tags}</relation>'
 
 
 def turn_restrictions(folder):

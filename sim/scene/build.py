@@ -57,8 +57,9 @@ def scene_origin_m(town: Town) -> FloatArray:
     low, high = town.network.points_m.min(axis=0), town.network.points_m.max(axis=0)
     if np.max(high - low) > FINE_M:
         roads = tour_graph(town.network)
-        return np.round(roads.middle_m[middle_edge(roads)])
-    middle: FloatArray = np.round(0.5 * (low + high))
+        middle: FloatArray = np.round(roads.middle_m[middle_edge(roads)])
+    else:
+        middle = np.round(0.5 * (low + high))
     return middle
 
 

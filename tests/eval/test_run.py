@@ -12,7 +12,7 @@ from hippodrome.sim import town_file
 
 @pytest.mark.parametrize(("large_bytes", "pools"), [(10, 2), (10_000, 1)], ids=["large", "small"])
 def test_a_large_town_is_evaluated_in_processes_that_did_not_draw_it(tmp_path, monkeypatch, large_bytes, pools):
-    """Recording and evaluating take some 800 and 700 MiB for 1,000 km of road, in one process the sum of both."""
+    """Recording and evaluating take some 800 and 750 MiB for 1,000 km of road, in one process the sum of both."""
     net_file = tmp_path / "town.net.xml"
     net_file.write_text(" " * 100)
     scenario, opened = SimpleNamespace(town=SimpleNamespace(network=net_file)), []

@@ -1,6 +1,7 @@
 """``hippodrome eval`` and ``render``: scenarios in, ``results.json``, tables and figures out.
 
-The work is done in rounds over one pool of processes: simulate every drive, draw every chunk of frames, evaluate every scenario.
+The work is done in rounds over one pool of processes: simulate every drive, draw every chunk of frames, evaluate every scenario
+(of large towns in a second pool, since the first one's processes are full of the town).
 The tasks of a round do not depend on one another, and no result depends on the number of processes.
 """
 
@@ -27,8 +28,10 @@ from hippodrome.sim.record import ROLES, RecordingPlan, finish, prepare, render_
 from hippodrome.sim.recording import CHUNK_FRAMES
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.town_file import is_large
 
 RESULTS = "results.json"
+EVALUATE = "evaluate"  # the stage after them
 RECORD_STAGES = ("simulate", "render", "seal")  # of ``make_recordings``
 
 
@@ -58,10 +61,14 @@ def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path) -> Res
         entries_of(scenario)  # what cannot be loaded is said before anything is simulated
     require_gl()
     plans = [RecordingPlan(scenario, role, out) for scenario in scenarios for role in ROLES]
-    with worker_pool(workers, (*RECORD_STAGES, "evaluate"), out) as pool:
+    tasks, rows = [EvaluationTask(scenario, out) for scenario in scenarios], None
+    with worker_pool(workers, (*RECORD_STAGES, EVALUATE), out) as pool:
         make_recordings(plans, pool)
-        tasks = [EvaluationTask(scenario, out) for scenario in scenarios]
-        rows = pool.run("evaluate", evaluate_scenario, tasks)
+        if not any(scenario.town.network and is_large(scenario.town.network) for scenario in scenarios):
+            rows = pool.run(EVALUATE, evaluate_scenario, tasks)
+    if rows is None:  # processes that simulated and drew a large town hold as much again as the evaluation takes
+        with worker_pool(workers, (EVALUATE,), out) as pool:
+            rows = pool.run(EVALUATE, evaluate_scenario, tasks)
     results = Results(scenarios=tuple(rows))
     write_results(out / RESULTS, results)
     write_atomically(out / "table1.md", table_one_markdown(results, quoted_rows()).encode())

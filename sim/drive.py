@@ -30,6 +30,7 @@ DRIVE_STEP_S: Final = 0.05  # of the ego's car; two steps to one of SUMO's
 ROAM_PER_VEHICLE_M: Final = 200.0  # traffic uses the tour's area and as much around it as keeps queues at signals short
 CLEAR_AFTER_STEPS: Final = 20  # of SUMO: two seconds, within which one that turns has gone by
 TOUCHING_M: Final = 0.4  # boxes that overlap by less touch: the car's motion is not SUMO's to the last decimetre
+REACH_M: Final = 11.0  # between the ego's rear axle and the middle of the longest vehicle, when their boxes touch
 SAME_ROAD_M: Final = 2.0  # of height between vehicles on one road; bridges are higher
 SAMPLES: Final = round(SUMO_STEP_S / DRIVE_STEP_S)  # of the drive to a step of SUMO
 WIDTH_M: Final = 1.8  # of the ego
@@ -76,7 +77,7 @@ def _as_drive(town: Town, graph: TourGraph, log: DriveLog, ego: EgoSpec, rng: np
         yaw_rate_radps=track.yaw_rate_radps,
         lane=lane,
         lane_position_m=position_m,
-        traffic=clear_at_start(log.traffic(), track.poses_m[::SAMPLES], None if heights_m is None else heights_m[::SAMPLES]),
+        traffic=_clear_traffic(log.traffic(), track.poses_m[::SAMPLES], None if heights_m is None else heights_m[::SAMPLES]),
         coverage=coverage,
         revisit_share=revisit_share,
         heights_m=heights_m,
@@ -105,6 +106,43 @@ def clear_at_start(log: TrafficLog, poses_m: FloatArray, heights_m: FloatArray |
         if not inside:
             break
         left_out[rows[np.isin(log.vehicle[rows], list(inside))]] = True
+    return _without(log, left_out)
+
+
+def clear_on_the_way(log: TrafficLog, poses_m: FloatArray, heights_m: FloatArray | None = None) -> TrafficLog:
+    """The traffic without the visits of those who come inside the ego on its way, from when they come into sight to when they
+    leave it.
+
+    Where the ego turns round or the junction is tight, the car swings wider than SUMO's ego, which turns on the spot, and whom
+    SUMO let pass beside that one would drive through it.
+
+    Args:
+        log: SUMO's steps.
+        poses_m: poses (n, 3) of the ego's rear axle at each of them.
+        heights_m: its heights (n,), where roads climb: who passes above or below it is not inside.
+    """
+    step = np.repeat(np.arange(len(log.t_s)), np.diff(log.start))
+    rows = np.flatnonzero(step < len(poses_m))
+    gap_m = np.linalg.norm(log.poses_m[rows, :2] - poses_m[step[rows], :2], axis=1)
+    inside = np.zeros(len(step), dtype=bool)
+    for row in rows[gap_m < REACH_M].tolist():
+        inside[row] = _are_inside(poses_m[step[row]], log.poses_m[[row]], log.kind[[row]])[0]
+    if heights_m is not None:
+        inside[rows] &= np.abs(log.poses_m[rows, 3] - heights_m[step[rows]]) < SAME_ROAD_M
+    left_out = np.zeros(len(step), dtype=bool)
+    for vehicle in np.unique(log.vehicle[inside]):
+        seen = np.flatnonzero(log.vehicle == vehicle)
+        for visit in np.split(seen, np.flatnonzero(np.diff(step[seen]) > 1) + 1):
+            left_out[visit] = inside[visit].any()
+    return _without(log, left_out)
+
+
+def _clear_traffic(log: TrafficLog, poses_m: FloatArray, heights_m: FloatArray | None) -> TrafficLog:
+    return clear_on_the_way(clear_at_start(log, poses_m, heights_m), poses_m, heights_m)
+
+
+def _without(log: TrafficLog, left_out: BoolArray) -> TrafficLog:
+    """The traffic without some of its rows (k,)."""
     if not left_out.any():
         return log
     gone = np.concatenate([[0], np.cumsum(left_out)])

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, Final, TypeAlias
 from xml.sax import SAXException, parse
@@ -29,6 +31,20 @@ WIDEST_M: Final = 1000.0
 OLDEST_VERSION: Final = "0.13"  # of networks that do not say theirs
 
 
+@contextmanager
+def many_objects() -> Iterator[None]:
+    """Within the block Python looks for no cycles of objects: ``sumolib`` makes millions that all stay, and each look at them
+    takes as long as making them did."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
+@many_objects()
 def load_net(net_file: Path) -> SumoNet:
     """``sumolib``'s network, internal lanes included; every way of being unreadable is one ``HippodromeError``."""
     _reject_foreign(net_file)

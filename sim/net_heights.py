@@ -15,6 +15,7 @@ from hippodrome.sim.net_file import SumoNet
 
 FLAT_M: Final = 0.05  # less than this between the lowest and the highest point is no height
 ABOVE_M: Final = 2.0  # roads that cross with less than this between them would touch
+STEEPEST: Final = 0.5  # metres up or down per metre; the steepest street of all has 0.35, and ramps of car parks less
 AT_ENDS_M: Final = 12.0  # roads that meet this close to an end of one of them share a junction, or are meant to
 
 
@@ -59,6 +60,23 @@ def pitch_rad(along_m: FloatArray, heights_m: FloatArray, wheelbase_m: float) ->
     slope = np.where(np.isfinite(slope), slope, slope[last[-1]] if len(last) else 0.0)
     pitch: FloatArray = np.arctan(slope)
     return pitch
+
+
+def too_steep(network: RoadNetwork, heights_m: FloatArray | None) -> Iterator[str]:
+    """A note where roads are steeper than any: heights that are wrong, or a shape that lost its points when it was imported."""
+    if heights_m is None:
+        return
+    owner = np.repeat(np.arange(network.lane_count), np.diff(network.point_start))
+    steps_m = np.linalg.norm(np.diff(network.points_m, axis=0), axis=1)
+    rise = np.abs(np.diff(heights_m)) / np.maximum(steps_m, 1e-6)
+    rise[(owner[1:] != owner[:-1]) | network.is_internal[owner[1:]]] = 0.0
+    if np.any(rise > STEEPEST):
+        edges = network.lane_edge[owner[1:]]
+        count, worst = len(np.unique(edges[rise > STEEPEST])), int(np.argmax(rise))
+        yield (
+            f"{count} road(s) climb or fall by more than {STEEPEST:.0%}, for instance {network.edge_ids[edges[worst]]} by "
+            f"{rise[worst]:.0%}; such heights are driven and drawn as they are"
+        )
 
 
 def crossings_without_height(net: SumoNet, network: RoadNetwork, heights_m: FloatArray | None) -> Iterator[str]:

@@ -87,7 +87,7 @@ def toured_area(graph: TourGraph, length_m: float) -> IntArray:
     It depends on the network only, so that two drives of different seeds meet. Every edge on the round trip to a member has no
     longer a round trip itself, so the area is strongly connected.
     """
-    middle = _middle_edge(graph)
+    middle = middle_edge(graph)
     round_trip = dijkstra(graph.cost_m, indices=middle) + dijkstra(graph.cost_m.T.tocsr(), indices=middle)
     round_trip[middle] = 0.0
     order = np.argsort(round_trip, kind="stable")
@@ -118,7 +118,7 @@ def _way_to_least_visited(cost: csr_array, here: int, count: IntArray, area: Int
     return way[::-1]
 
 
-def _middle_edge(graph: TourGraph) -> int:
+def middle_edge(graph: TourGraph) -> int:
     """The edge nearest to the centre of gravity of the drivable roads."""
     centre = np.average(graph.middle_m, axis=0, weights=graph.length_m)
     return int(np.argmin(np.linalg.norm(graph.middle_m - centre, axis=1)))

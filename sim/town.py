@@ -22,8 +22,8 @@ from hippodrome.core.types import FloatArray, HippodromeError
 from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.generators import Plan, closest_plan, grid_plan, radial_plan, through_nodes, without_dead_ends
 from hippodrome.sim.map_import import LEFT_HAND, sumo_network
-from hippodrome.sim.net_file import SumoNet, check_places_to_wait, is_left_hand, load_net
-from hippodrome.sim.net_heights import crossings_without_height, lane_heights_m
+from hippodrome.sim.net_file import SumoNet, check_places_to_wait, is_left_hand, load_net, many_objects
+from hippodrome.sim.net_heights import crossings_without_height, lane_heights_m, too_steep
 from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
@@ -85,6 +85,7 @@ def _check_side(choice: Choice, left_hand: bool, network: Path) -> None:
         )
 
 
+@many_objects()
 def read_town(net_file: Path, name: str | None = None) -> Town:
     """A town from a SUMO network file, checked."""
     net = load_net(net_file)
@@ -103,7 +104,7 @@ def read_town(net_file: Path, name: str | None = None) -> Town:
         notes=check_network(net, network, net_file),
     )
     heights_m = lane_heights_m(net, network)
-    notes = (*town.notes, *crossings_without_height(net, network, heights_m))
+    notes = (*town.notes, *crossings_without_height(net, network, heights_m), *too_steep(network, heights_m))
     if heights_m is not None:
         outlines = (np.array(node.getShape3D(), dtype=np.float64) for node in _paved_nodes(net))
         town = replace(town, heights_m=heights_m, junction_heights_m=tuple(outline[:, 2] for outline in outlines))

@@ -30,6 +30,12 @@ WORDS: Final = ("lane_ids", "edge_ids")  # parts of its network that are names
 NUMBERS: Final = tuple(field.name for field in fields(RoadNetwork) if field.name not in WORDS)
 
 
+def is_large(net_file: Path) -> bool:
+    """Whether a network's file is so large that its town is kept; one that is not there is not, and who reads it says so."""
+    most_bytes = LARGE_PACKED_BYTES if net_file.suffix == ".gz" else LARGE_BYTES
+    return net_file.is_file() and net_file.stat().st_size > most_bytes
+
+
 def kept_town(net_file: Path, folder: Path, read: Callable[[], Town]) -> Town:
     """The town of a network. A large one is read and checked once, by one process, and then kept in ``folder``.
 
@@ -38,8 +44,7 @@ def kept_town(net_file: Path, folder: Path, read: Callable[[], Town]) -> Town:
         folder: Where the town is kept, under a name that the network's bytes and our code give.
         read: Reads and checks the network.
     """
-    most_bytes = LARGE_PACKED_BYTES if net_file.suffix == ".gz" else LARGE_BYTES
-    if not net_file.is_file() or net_file.stat().st_size <= most_bytes:  # who reads a file that is not there says so
+    if not is_large(net_file):
         return read()
     recipe = sha256_of(net_file), net_file.name, code_sha256(PACKAGE, CODE), version("eclipse-sumo")
     path = folder / f"{net_file.name.partition('.')[0]}-{hashlib.sha256(repr(recipe).encode()).hexdigest()[:12]}.town.npz"

@@ -21,6 +21,7 @@ CURES: Final = {  # what to do, by words in the notes of ``sim.network.check_net
     "have one lane for both directions": "nothing to do; for traffic there, give each direction a lane of its own in netedit",
     "has no lanes inside junctions": "the lanes are then made, also where the file has connections without them",
     "cross without a junction": "give the upper road its height (x,y,z in netedit), or join them in a junction",
+    "climb or fall by more than": "look at the heights of this road, and how many points its shape has, in netedit",
     "wait for a hand": "nothing to do; a program of your own, drawn in netedit, is kept",
 }
 COMPLETE: Final = (IMPORT, "netconvert: ")  # notes on an import say themselves what to do

@@ -55,8 +55,8 @@ def preview_scenario(scenario: Scenario, out: Path) -> Preview:
     """Simulate both drives, and draw ``overview.png`` and ``stills.png`` into ``out``. Raises HippodromeError."""
     require_gl()
     plans = {role: RecordingPlan(scenario, role, out) for role in ROLES}
-    town = plans["mapping"].town()
-    simulated = dict(zip(plans, _simulated(scenario, list(plans.values()), town), strict=True))
+    town, results = _town_and_drives(scenario, list(plans.values()))
+    simulated = dict(zip(plans, results, strict=True))
     drives = {role: drive for role, (drive, _) in simulated.items()}
     samples = {role: sampled for role, (_, sampled) in simulated.items()}
     mapping, second = drives["mapping"], drives["localization"]
@@ -69,13 +69,22 @@ def preview_scenario(scenario: Scenario, out: Path) -> Preview:
     return preview
 
 
-def _simulated(scenario: Scenario, plans: list[RecordingPlan], town: Town) -> list[tuple[Drive, Samples]]:
-    """The drives. Those on somebody's network are simulated in processes of their own: SUMO crashes on some networks."""
+def _town_and_drives(scenario: Scenario, plans: list[RecordingPlan]) -> tuple[Town, list[tuple[Drive, Samples]]]:
+    """The town, and the drives. Those on somebody's network are simulated in processes of their own: SUMO crashes on some
+    networks. They load what they need while the town is read."""
     network = scenario.town.network
     if network is None:
-        return [simulate(plan, town) for plan in plans]
+        town = plans[0].town()
+        return town, [simulate(plan, town) for plan in plans]
     with worker_pool(len(plans)) as pool:
-        return pool.run("simulate", _simulate, [(plan, town) for plan in plans], place=lambda _: str(network))
+        for _ in plans:
+            pool.executor.submit(_load)
+        town = plans[0].town()
+        return town, pool.run("simulate", _simulate, [(plan, town) for plan in plans], place=lambda _: str(network))
+
+
+def _load() -> None:
+    import hippodrome.sim.ego  # noqa: F401  # takes seconds
 
 
 def _simulate(task: tuple[RecordingPlan, Town]) -> tuple[Drive, Samples]:

@@ -34,6 +34,7 @@ WITHOUT_DATE: Final[dict[str, dict[str, None]]] = {  # what a program usually no
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
 WHOLE_LANES_M: Final = 200e3  # a network with more of them is not drawn whole: a drive would be a dot in it
+WHOLE_ACROSS_M: Final = 50e3  # nor one that is wider: its parts lie far from each other
 AROUND_M: Final = 300.0  # of it, lanes this far around a drive are drawn
 AROUND_SHARE: Final = 0.25  # or this share of the drive's larger extent, if that is more
 FLOOR_M = 0.01  # where logarithmic error axes begin
@@ -100,7 +101,8 @@ def draw_network(axes: Axes, network: RoadNetwork, drive_m: FloatArray) -> None:
 
 def _drawn_lanes(network: RoadNetwork, drive_m: FloatArray) -> IntArray:
     """All lanes of a network that is drawn whole, else those that reach into the box of the drive and its surroundings."""
-    if network.lane_lengths_m()[~network.is_internal].sum() <= WHOLE_LANES_M or len(drive_m) == 0:
+    small = network.lane_lengths_m()[~network.is_internal].sum() <= WHOLE_LANES_M
+    if len(drive_m) == 0 or (small and np.ptp(network.points_m, axis=0).max() <= WHOLE_ACROSS_M):
         return np.arange(network.lane_count, dtype=np.int32)
     low_m, high_m = drive_m.min(axis=0), drive_m.max(axis=0)
     around_m = max(AROUND_M, AROUND_SHARE * float((high_m - low_m).max()))

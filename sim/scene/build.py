@@ -14,8 +14,10 @@ from hippodrome.sim.scene.light import colour, extinction_per_m, grain, haze_rgb
 from hippodrome.sim.scene.mesh import Mesh, merge
 from hippodrome.sim.scene.town_mesh import block_mesh, land_of, town_mesh
 from hippodrome.sim.scene.types import Scene, Tile
+from hippodrome.sim.tour import middle_edge, tour_graph
 from hippodrome.sim.types import Town
 
+FINE_M: Final = 100e3  # across; 32 bits tell 4 mm apart at 50 km from the middle
 TILE_M: Final = 80.0  # small enough to cull well, large enough that a frame needs few draw calls
 
 
@@ -50,8 +52,14 @@ def build_scene(
 
 
 def scene_origin_m(town: Town) -> FloatArray:
-    """Network coordinates (2,) of the scene's zero."""
-    middle: FloatArray = np.round(0.5 * (town.network.points_m.min(axis=0) + town.network.points_m.max(axis=0)))
+    """Network coordinates (2,) of the scene's zero: the middle of the network, or of the roads that are toured where the network
+    is so large that the scene's numbers of 32 bits would not tell centimetres there."""
+    low, high = town.network.points_m.min(axis=0), town.network.points_m.max(axis=0)
+    if np.max(high - low) > FINE_M:
+        roads = tour_graph(town.network)
+        middle: FloatArray = np.round(roads.middle_m[middle_edge(roads)])
+    else:
+        middle = np.round(0.5 * (low + high))
     return middle
 
 

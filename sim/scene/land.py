@@ -17,6 +17,7 @@ CELL_M: Final = 80.0  # as the tiles, so that no cell straddles two
 FINE_CELLS: Final = 8  # per side of a cell near the road
 NEAR_M: Final = 90.0  # from the road, where the ground's unevenness is visible
 REACH_M: Final = 280.0  # from the road, where the haze takes over
+PATCH_CELLS: Final = 5  # a side of the squares in which cells are sought: REACH_M and a cell's diagonal are less
 FIELD_Z_M: Final = 0.006
 ROW_Z_M: Final = 0.014
 GRASS: Final = np.array([0.36, 0.46, 0.21])
@@ -34,9 +35,7 @@ WOOD: Final = np.array([0.46, 0.38, 0.29])
 
 def ground_mesh(road_points_m: FloatArray, rng: np.random.Generator, holds: Callable[[FloatArray], Bools]) -> Mesh:
     """Grass around all roads (n, 2), coarse where far away; the cells whose middles (k, 2) are held."""
-    low = np.floor((road_points_m.min(axis=0) - REACH_M) / CELL_M)
-    high = np.ceil((road_points_m.max(axis=0) + REACH_M) / CELL_M)
-    grid = np.stack(np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1])), axis=-1).reshape(-1, 2) * CELL_M
+    grid = _cells_near(road_points_m) * CELL_M
     grid = grid[holds(grid + 0.5 * CELL_M)]
     distance = KDTree(road_points_m).query(grid + 0.5 * CELL_M)[0] - 0.7 * CELL_M  # less the cell's half diagonal
     fine, coarse = grid[distance < NEAR_M], grid[(distance >= NEAR_M) & (distance < REACH_M)]
@@ -46,6 +45,20 @@ def ground_mesh(road_points_m: FloatArray, rng: np.random.Generator, holds: Call
     seeds = tone.integers(2**63, size=2)
     parts = [_squares((fine[:, None] + offsets).reshape(-1, 2), step, seeds), _squares(coarse, CELL_M, seeds)]
     return merge(parts)
+
+
+def _cells_near(points_m: FloatArray) -> FloatArray:
+    """Columns and rows (k, 2) of the cells around points (n, 2), row by row: all that reach within ``REACH_M`` of one, and some
+    more. Their number follows the points', not the extent of the network, whose parts may lie continents apart."""
+    low, high = (np.floor((points_m.min(axis=0) - REACH_M) / CELL_M), np.ceil((points_m.max(axis=0) + REACH_M) / CELL_M))
+    parts = np.floor(points_m / (PATCH_CELLS * CELL_M)).astype(np.int64)
+    around = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(1, -1, 2)
+    parts = np.unique((np.unique(parts, axis=0)[:, None] + around).reshape(-1, 2), axis=0)
+    inside = np.stack(np.meshgrid(np.arange(PATCH_CELLS), np.arange(PATCH_CELLS)), axis=-1).reshape(1, -1, 2)
+    cells = (PATCH_CELLS * parts[:, None] + inside).reshape(-1, 2).astype(np.float64)
+    cells = cells[np.all((cells >= low) & (cells < high), axis=1)]
+    ordered: FloatArray = cells[np.lexsort((cells[:, 0], cells[:, 1]))]
+    return ordered
 
 
 def _squares(corner_m: FloatArray, side_m: float, seeds: np.ndarray) -> Mesh:

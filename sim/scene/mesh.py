@@ -51,7 +51,7 @@ def polygons(corners_m: FloatArray, albedo: FloatArray, surface: Surface = Surfa
     """Flat convex polygons (k, c, 3), each with its own vertices; ``albedo`` (3,), (k, 3) or (k, c, 3)."""
     corners = np.asarray(corners_m, dtype=np.float64)
     k, c = corners.shape[:2]
-    normals = np.cross(
+    normals = _cross(
         corners[:, c // 2] - corners[:, 0], corners[:, -1] - corners[:, 1 % c] if c > 3 else corners[:, 2] - corners[:, 0]
     )
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
@@ -65,6 +65,15 @@ def polygons(corners_m: FloatArray, albedo: FloatArray, surface: Surface = Surfa
         surface=np.full(k * c, surface, dtype=np.uint8),
         faces=(np.arange(k)[:, None, None] * c + fan).reshape(-1, 3).astype(np.int32),
     )
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Products (k, 3) at right angles to vectors (k, 3). NumPy's own spends more time on its arguments than on a small mesh."""
+    product: FloatArray = np.empty(a.shape)
+    for axis in range(3):
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        product[:, axis] = a[:, one] * b[:, other] - a[:, other] * b[:, one]
+    return product
 
 
 def turned(local: FloatArray, origin_m: FloatArray, yaw_rad: FloatArray) -> FloatArray:

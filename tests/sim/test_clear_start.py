@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hippodrome.sim.drive import clear_at_start
+from hippodrome.sim.drive import clear_at_start, clear_on_the_way
 from hippodrome.sim.types import TrafficLog
 
 STANDING = np.tile([10.0, 20.0, 0.5], (40, 1))
@@ -55,3 +55,16 @@ def test_who_passes_below_a_bridge_is_seen():
 def test_no_traffic_is_no_traffic():
     empty = TrafficLog(np.empty(0), np.zeros(1, np.int32), np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, np.uint8))
     assert clear_at_start(empty, STANDING) is empty
+
+
+def test_who_comes_inside_on_the_way_is_not_seen_on_that_visit():
+    through, beside = passing(4.0, -8.0), passing(4.0, -8.0) + np.array([6.0, 0.0, 0.0])
+    whole = log((7, CAR, through), (8, CAR, beside))
+    found = clear_on_the_way(whole, STANDING)
+    assert steps_of(found, 7) == [] and steps_of(found, 8) == list(range(40))
+    gap = log((7, CAR, through))
+    earlier = TrafficLog(gap.t_s, np.array([*range(6), *([5] * 10), *range(6, 31)], dtype=np.int32)[:41],
+                         gap.vehicle[:30], np.vstack([passing(0.0, 40.0)[:5], through[15:]]), gap.kind[:30])  # fmt: skip
+    assert steps_of(clear_on_the_way(earlier, STANDING), 7) == list(range(5)), "an earlier visit stays"
+    below = log((7, CAR, np.hstack([through, np.zeros((40, 2))])), width=5)
+    assert clear_on_the_way(below, STANDING, np.full(40, 6.0)) is below

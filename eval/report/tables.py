@@ -39,10 +39,21 @@ def scrolling(table: Html, label: str) -> Html:
 
 
 def plain_table(heads: Sequence[str], rows: Sequence[Sequence[Child]], label: str) -> Html:
-    """A table with the first column to the left and the others to the right; ``label`` names it for screen readers."""
-    head = element("tr", [element("th", title, scope="col") if title else element("td") for title in heads])
-    body = [element("tr", row_head(row[0]), [element("td", cell) for cell in row[1:]]) for row in rows]
+    """A table with words to the left and figures to the right; ``label`` names it for screen readers."""
+    kinds = [None, *("text" if _is_words([row[place] for row in rows]) else None for place in range(1, len(heads)))]
+    head = element("tr", [element("th", title, scope="col", class_=kind) if title else element("td")
+                          for title, kind in zip(heads, kinds, strict=True)])  # fmt: skip
+    body = [
+        element("tr", row_head(row[0]), [element("td", cell, class_=kind) for cell, kind in zip(row[1:], kinds[1:], strict=True)])
+        for row in rows
+    ]
     return scrolling(element("table", element("thead", head), element("tbody", body)), label)
+
+
+def _is_words(cells: Sequence[Child]) -> bool:
+    """Whether no cell of a column begins with a figure."""
+    texts = [re.sub("<[^>]*>", "", joined(cell)).strip() for cell in cells]
+    return any(text not in ("", NONE) for text in texts) and not any(re.match(r"[<(+-]?\s*\d", text) for text in texts)
 
 
 def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Sequence[Child]], label: str) -> Html:

@@ -140,7 +140,7 @@ def _table(lines: Sequence[Sequence[str]], label: str) -> Html:
     made = plain_table(
         [head for head, _ in flat], [[_toned(cells[place]) for _, cells in flat] for place in range(len(rows))], label
     )
-    return made if same is None else joined(element("p", f"{same}: {said}", class_="note"), made)
+    return made if same is None else joined(element("p", f"{same[:1].upper()}{same[1:]}: {said}.", class_="note"), made)
 
 
 def _split(head: str, cells: Sequence[str]) -> list[tuple[str, list[str]]]:

@@ -9,7 +9,7 @@ from hippodrome.eval.report.markup import Html, element
 
 MEANINGS: Final = {  # by the begin of a head, without its unit; of several that fit, the longest
     "APE": "how far the map puts the car from its true place, in metres, in the mean over the first drive. Methods that do not "
-           "know the roads are given the true starting pose; those that know them are given nothing",
+           "know the roads are given the true starting pose",
     "APE SE(2)": "the APE after the whole map was moved and turned to fit the truth best: shape and scale are left",
     "APE Sim(2)": "the APE after the whole map was moved, turned and scaled to fit the truth best: shape is left",
     "APE median": "the APE that half of the vertices stay below",

@@ -130,7 +130,8 @@ def _table(figure: Figure, drives: tuple[Drive, ...], rows: Sequence[tuple[Path,
             cell.refusals.append(row.refused)
         cell.sources.append(f"{folder.name}/{RESULTS}, seed {scenario.seed}, sha256 {_sha256(scenario)}")
         cell.command = cell.command or shlex.join(["hippodrome", "eval", f"{folder}/{scenario.name}/scenario.json"])
-    return Table(figure, drives, dict(sorted(lines.items())))
+    order = list(dict.fromkeys(row.method for _, _, row in rows))[::-1]  # what a run is about first, as in the report
+    return Table(figure, drives, dict(sorted(lines.items(), key=lambda line: (order.index(line[0][0]), line[0][1]))))
 
 
 def _sha256(scenario: ScenarioResult) -> str:

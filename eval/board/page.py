@@ -36,14 +36,24 @@ for (const table of document.querySelectorAll('table')) {
 """
 STYLE: Final = """
 td details { margin: 0; text-align: left; white-space: normal; max-width: 26rem; margin-left: auto; }
-td summary { margin-left: auto; } td small { display: block; }
+td summary { margin-left: auto; white-space: nowrap; } td small { display: block; }
 """
 
 
 def write_board(folders: Sequence[Path], out: Path) -> Path:
     """Write the board of these result folders into ``out``, a file; its path. Raises HippodromeError."""
-    write_atomically(out, board_html(tables(read_folders(folders)), [folder.name for folder in folders]).encode())
+    write_atomically(out, board_html(tables(read_folders(folders)), folder_names(folders)).encode())
     return out
+
+
+def folder_names(folders: Sequence[Path]) -> list[str]:
+    """The folders' names; the whole path of those that share their name with another."""
+    names = [folder.name for folder in folders]
+    return [str(folder) if names.count(folder.name) > 1 else folder.name for folder in folders]
+
+
+def _counted(folders: int) -> str:
+    return "one folder" if folders == 1 else f"{folders} folders"
 
 
 def board_html(made: Sequence[Table], names: Sequence[str]) -> str:
@@ -51,8 +61,9 @@ def board_html(made: Sequence[Table], names: Sequence[str]) -> str:
     sections = [element("section", element("h2", table.figure.title), _table(table), id=table.figure.key) for table in made]
     links = [element("a", table.figure.title, href=f"#{table.figure.key}") for table in made]
     lede = (
-        f"Methods and scenarios of {len(names)} result folder(s): {', '.join(names)}. A click on a heading sorts by its column; "
-        "a cell opens to show its definition, its spread, where it is from and the command that makes it again."
+        f"Methods and scenarios of {_counted(len(names))} of results: {', '.join(names)}. "
+        "A click on a heading sorts by its column. A cell opens to show its definition, its spread, where it is from and the "
+        "command that makes it again."
     )
     body = element(
         "body",
@@ -121,7 +132,8 @@ def _summary(cell: Cell) -> Html:
     if cell.values:
         parts.append(f"{np.mean(cell.values):.2f}")
     if len(cell.values) > 1:
-        parts.append(f"({min(cell.values):.2f} to {max(cell.values):.2f}, {len(cell.values)} runs)")
+        least, most = f"{min(cell.values):.2f}", f"{max(cell.values):.2f}"
+        parts.append(f"({len(cell.values)} runs)" if least == most else f"({least} to {most}, {len(cell.values)} runs)")
     parts += [f"{len(cell.failures)} FAILED"] if cell.failures else []
     parts += [f"{len(cell.refusals)} REFUSED"] if cell.refusals else []
     return joined(" ".join(parts))

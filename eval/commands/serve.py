@@ -38,9 +38,11 @@ def _port(text: str) -> int:
 
 def _serve(options: argparse.Namespace) -> int:
     from hippodrome.eval.commands.runs import show
-    from hippodrome.eval.report.serve import ADDRESS, make_server
+    from hippodrome.eval.report.serve import ADDRESS, make_server, missing_note
 
     with make_server(options.folder, options.port) as server:
+        if (missing := missing_note(options.folder)) is not None:
+            print(missing)
         address = f"http://{ADDRESS}:{server.server_address[1]}/"
         print(f"{address}  (Ctrl-C ends it)", flush=True)
         if options.open:

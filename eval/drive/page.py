@@ -27,8 +27,8 @@ EVERY: Final = 5  # a point of the trace in half a second
 MARGIN_M: Final = 15.0
 CAR_SHARE: Final = 0.03  # length of the car that plays, as a share of the town's width: one in scale could not be seen
 LEGEND: Final = (
-    "The ways of one row, a colour for each mission: from the small dot to the large one, dashed until the vehicle knew where it "
-    "was. The arrow is the vehicle, the circle where it believed to be."
+    "These are the ways that one row drove, with a colour for each mission. A way leads from the small dot to the large one, and "
+    "is dashed until the vehicle knew where it was. The arrow is the vehicle; the circle is where it believed to be."
 )
 STYLE: Final = """
 .roads-map { width: 100%; height: auto; max-height: 75vh; display: block; border: 1px solid var(--line); border-radius: 10px; }
@@ -36,9 +36,12 @@ STYLE: Final = """
 .roads-map .way { fill: none; stroke-width: 1.3; } .roads-map .lost { stroke-dasharray: 3 3; }
 .roads-map .one { opacity: .45; } .roads-map .chosen { opacity: 1; }
 .roads-map .car { fill: var(--ink); } .roads-map .belief { fill: none; stroke: var(--ink); stroke-width: 1; }
-.words td { white-space: normal; min-width: 6em; } .words td, .words thead th { text-align: left; }
+.words { margin-top: 1rem; } .words td { white-space: normal; min-width: 8em; } .words td:nth-child(9) { min-width: 16em; }
+.words td, .words thead th { text-align: left; }
 .drive-controls { display: flex; flex-wrap: wrap; gap: .5rem 1rem; align-items: center; margin: .5rem 0; }
-.drive-controls input { flex: 1 1 12rem; min-width: 0; } .drive-controls select { max-width: 100%; }
+.drive-controls input { flex: 1 1 12rem; min-width: 0; }
+.drive-controls :is(select, button) { max-width: 100%; font: inherit; padding: .2rem .6rem; min-height: 2.1rem; }
+.drive-controls select { color: inherit; background: var(--paper); border: 1px solid var(--line); border-radius: 6px; }
 """
 
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from hippodrome.eval.figures.style import BLUE, VERMILION, log_errors, new_figure, save_figure, tidy
+
+LEAST_WIDTH_IN: Final = 6.6  # the title takes so much
 
 
 def draw_stress(path: Path, apes_m: Mapping[str, Sequence[float | None]]) -> None:
@@ -19,7 +22,7 @@ def draw_stress(path: Path, apes_m: Mapping[str, Sequence[float | None]]) -> Non
         path: The picture.
         apes_m: Mean APE of each run by name of the case, None where the refinement vouched for nothing.
     """
-    figure = new_figure(1.2 + 1.15 * len(apes_m), 4.6)
+    figure = new_figure(max(1.2 + 1.15 * len(apes_m), LEAST_WIDTH_IN), 4.6)
     axes = figure.subplots()
     known = [np.array([value for value in values if value is not None]) for values in apes_m.values()]
     for place, (values, all_runs) in enumerate(zip(known, apes_m.values(), strict=True)):

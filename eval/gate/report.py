@@ -80,10 +80,15 @@ HEADS = ("method", "figure", "before", "after", "change", "95 % interval", "p", 
 def summary_markdown(verdict: Verdict, limits: Sequence[str]) -> str:
     """For ``$GITHUB_STEP_SUMMARY``."""
     title = f"### Gate: {outcome_of(verdict, limits)}"
-    rows = [[escaped(cell, html=True) for cell in _cells(change)] for change in verdict.changes]
+    rows = [[escaped(cell, html=True) for cell in _cells(change)] for change in by_concern(verdict.changes)]
     unsure = [f"{change.method}: {_why(change)}" for change in verdict.changes if change.undecided]
     reasons = [f"- {escaped(line, html=True)}" for line in (*verdict.lost, *limits, *unsure)]
     return "\n".join([title, "", *markdown_table(HEADS, rows, align="left"), "", *reasons]) + "\n"
+
+
+def by_concern(changes: Sequence[Change]) -> list[Change]:
+    """Changes that fail the gate first, then those that the pairs do not tell about; the others stay in their order."""
+    return sorted(changes, key=lambda change: (not change.regressed, not change.undecided))
 
 
 def junit_xml(verdict: Verdict, limits: Sequence[str]) -> bytes:

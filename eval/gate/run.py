@@ -27,6 +27,11 @@ from hippodrome.sim.scenario import Thresholds
 SUMMARY = "GITHUB_STEP_SUMMARY"  # where GitHub Actions wants Markdown
 
 PAGE = "gate.html"
+PAGE_NOTE = (
+    "Before is the baseline, after is this run; both are geometric means over the pairs of scenario and seed. The true change "
+    "lies within the interval 95 times of 100. p is the probability that chance alone makes a figure this much worse. WORSE "
+    "fails the gate; the worst pair is the one that became worse most."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +69,7 @@ def gate(request: GateRequest) -> str:
     if known is not None:
         verdict = compare(found, known, request.town_limit)
         outcome = say(verdict, limits, request.junit)
-        text = summary_markdown(verdict, limits)
+        text = f"{summary_markdown(verdict, limits)}\n{PAGE_NOTE}\n"
         write_trial_page(request.out / PAGE, "Gate", text, command="hippodrome gate", verdict=outcome)
         print(f"page: {request.out / PAGE}")
         return outcome

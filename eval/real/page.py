@@ -27,7 +27,7 @@ STYLE: Final = """
 .drive-map .truth { fill: none; stroke: var(--truth); }
 .drive-map .line { fill: none; stroke-linecap: round; stroke-linejoin: round; }
 .drive-map text { fill: var(--ink); paint-order: stroke; stroke: var(--paper);
-  font-family: system-ui, sans-serif; font-weight: 600; font-size: calc(15 * var(--pixel)); }
+  font-family: system-ui, sans-serif; font-weight: 600; font-size: calc(18 * var(--pixel)); }
 .legend { display: flex; flex-wrap: wrap; gap: 0.3rem 1.2rem; font-size: 0.88rem; color: var(--soft);
   padding: 0; list-style: none; }
 .legend span { display: inline-block; width: 1.4rem; height: 0.3rem; border-radius: 2px; vertical-align: middle;
@@ -84,7 +84,7 @@ def _tiles(drive: Drive) -> Html:
     good = int(np.count_nonzero(status == MatchStatus.MATCHED))
     steps_m = np.hypot(*np.diff(drive.cognitive_map.poses[:, :2], axis=0).T)
     tiles = [
-        ("vouched for", f"{good / max(1, len(status)):.0%}", f"{good} of {len(status)} vertices"),
+        ("vouched for", f"{100.0 * good / max(1, len(status)):.0f} %", f"{good} of {len(status)} vertices"),
         ("driven", f"{float(steps_m.sum()) / 1e3:.2f} km", f"in {float(drive.recording.samples.t_s[-1]):.0f} s"),
         (
             "not vouched for",
@@ -213,7 +213,7 @@ def _figures(scores: tuple[str, ...]) -> Html:
         for numbers, definition in map(_parted, scores)
         if definition
     ]
-    words = [element("p", line, class_="note") for line in scores if not _parted(line)[1]]
+    words = [element("p", f"{line[:1].upper()}{line[1:]}", class_="note") for line in scores if not _parted(line)[1]]
     heads = element("tr", element("th", "error"), element("th", "what is measured"))
     table = element("table", element("thead", heads), element("tbody", rows), class_="words", aria_label="figures")
     return joined(element("div", table, class_="scroll") if rows else "", words)

@@ -35,7 +35,7 @@ function makeChart(canvas, story) {
     segments.forEach((one, i) => {
       if (i % 2) { on.fillStyle = inks.panel; on.fillRect(X(one.s0), CHART_TOP, X(one.s1) - X(one.s0), size.h - CHART_TOP - CHART_BOTTOM); }
       on.fillStyle = inks.soft;
-      const words = PARTS[one.kind], room = X(one.s1) - X(one.s0);
+      const words = partWords(one), room = X(one.s1) - X(one.s0);
       const fitting = [words, words.slice(0, 1)].find((text) => on.measureText(text).width < room - 4);
       if (fitting) on.fillText(fitting, X(one.s0) + 3, 8);
       seconds(on, one);
@@ -56,18 +56,21 @@ function makeChart(canvas, story) {
     nameCurves(on);
   }
 
+  /** The name of a part; on a phone the first part leaves its room to the names of the curves. */
+  const partWords = (one) => (one.kind === "map" && size.w < 480 ? PARTS.map.slice(0, 1) : PARTS[one.kind]);
+
   /** The names of the curves of the first drive in their colours, beside the name of its part, as far as there is room. */
   function nameCurves(on) {
     const first = segments.find((one) => one.kind === "map");
-    let x = first ? X(first.s0) + 80 : Infinity;
+    let x = first ? X(first.s0) + on.measureText(partWords(first)).width + 10 : Infinity;
     for (const { path, drive, colour } of curves()) {
       const wide = on.measureText(path.name).width;
-      if (drive !== 1 || x + wide + 16 > X(first.s1)) continue;
+      if (drive !== 1 || x + wide + 12 > X(first.s1)) continue;
       on.fillStyle = colour;
-      on.fillRect(x, 7, 12, 3);
+      on.fillRect(x, 7, 10, 3);
       on.fillStyle = inks.soft;
-      on.fillText(path.name, x + 16, 8);
-      x += wide + 30;
+      on.fillText(path.name, x + 13, 8);
+      x += wide + 21;
     }
   }
 

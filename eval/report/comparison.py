@@ -38,5 +38,5 @@ def ratios(found: Mapping[str, Any]) -> Html | None:
 
 def fairness(scenario: ScenarioResult) -> Html | None:
     """What each method of a scenario's rows is given; None if none of them is described."""
-    rows = fairness_rows(scenario.rows)
+    rows = fairness_rows(reversed(scenario.rows))  # in the order of the other tables
     return plain_table(HEAD, rows, "what each method is given") if rows else None

@@ -47,7 +47,7 @@ def _ape_m(row: Row) -> float:
 
 def _best(results: Results, best: str | None) -> Html:
     if best is None:
-        return joined("none: no map was scored")
+        return joined("None: no map was scored.")
     least = [
         (min(map(_ape_m, rows)), row)
         for one in results.scenarios
@@ -60,10 +60,10 @@ def _best(results: Results, best: str | None) -> Html:
     count = len(results.scenarios)
     where = "in the one town" if count == 1 else f"in {wins} of {count} towns"
     meaning = (
-        "APE is how far from its true place the map puts the car, in the mean over the first drive. "
-        "Methods that do not know the roads begin at the true pose."
+        "APE (absolute position error) is how far the map puts the car from its true place, in the mean over the first drive. "
+        "Methods that do not know the roads are given the true starting pose."
     )
-    return joined(element("strong", best), f": the smallest mean APE {where}, {spread}. {meaning}")
+    return joined(element("strong", best), f" has the smallest mean APE {where}, {spread}. {meaning}")
 
 
 def _worst(results: Results, found: Sequence[ScenarioFiles], best: str | None) -> Html | None:
@@ -78,7 +78,7 @@ def _worst(results: Results, found: Sequence[ScenarioFiles], best: str | None) -
         return None
     error_m, town, t_s = max(places)
     link = element("a", "see it there", href=place_address(town, 1, t_s))
-    return joined(f"{town}, {t_s:.0f}{NBSP}s into the first drive: {best} is {error_m:.2f}{NBSP}m off; ", link, ". ",
+    return joined(f"In {town}, {t_s:.0f}{NBSP}s into the first drive, {best} is {error_m:.2f}{NBSP}m off: ", link, ". ",
                   "Each town's tab shows its worst places with their camera frames, and why.")  # fmt: skip
 
 
@@ -94,11 +94,11 @@ def _localized(results: Results, best: str | None) -> Html | None:
     if fixed:
         when = _between([one.initial_drive_s or 0.0 for _, one in fixed], "s", 1)
         errors = [one.error_mean_m for _, one in fixed if one.error_mean_m is not None]
-        parts.append(f"in the map of {best}, localized from an unknown start after {when}")
+        parts.append(f"In the map of {best}, it was localized from an unknown start after {when}")
         parts[0] += ", as soon as several views in a row agreed on one place"
-        parts += [f"from then on {_between(errors)} off in the mean"] if errors else []
+        parts += [f"from then on it was {_between(errors)} off in the mean"] if errors else []
     if lost:
-        parts.append(f"never localized in {_named(lost)}")
+        parts.append(f"{'it' if fixed else 'It'} was never localized in {_named(lost)}")
     return joined("; ".join(parts) + ".") if parts else None
 
 
@@ -106,7 +106,7 @@ def _troubles(results: Results) -> Html:
     """What was refused, failed or missed its limit, with the cause; or that there is no such thing."""
     lines = [(one.name, line) for one in results.scenarios for line in _trouble_lines(one)]
     if not lines:
-        return joined("nothing: every method has a map in every town, and all limits hold.")
+        return joined("Nothing: every method has a map in every town, and all limits hold.")
     more = [element("li", f"and {len(lines) - MOST_NAMED} more, in the towns' tabs")] if len(lines) > MOST_NAMED else []
     return element("ul", [element("li", f"{town}: {line}") for town, line in lines[:MOST_NAMED]], more, class_="failures")
 

@@ -67,11 +67,12 @@ function showFigures(found) {
 
 function show(found) {
   const { stages, pages } = found, busy = stages.length > 0, current = stages.at(-1);
-  setText(at("state"), busy ? "under way" : pages.length ? "done" : "waiting");
+  setText(at("state"), busy ? "under way" : pages.length ? "done" : found.missing ? "no such folder" : "waiting");
   at("state").classList.toggle("good", !busy && pages.length > 0);
+  at("state").classList.toggle("bad", !busy && Boolean(found.missing));
   const next = busy && found.plan[found.plan.indexOf(current.name) + 1];
   setText(at("words"), busy ? `At work: ${current.name}, ${current.done} of ${current.total}.${next ? ` Next: ${next}.` : " Then the page is written."}`
-    : pages.length ? "The run is over; its pages:" : "No run has begun in this folder yet. This page fills as soon as one does.");
+    : pages.length ? "The run is over; its pages:" : found.missing ? `${found.missing}${found.missing.endsWith("?") ? "" : "."}` : "No run has begun in this folder yet. This page fills as soon as one does.");
   at("pages").replaceChildren(...(busy ? [] : pages.flatMap((name) => [make("a", name, { href: `/${name}` }), " "])));
   showStages(found);
   showDrives(found.drives);

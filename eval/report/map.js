@@ -46,13 +46,13 @@ function startMap(root) {
     for (const layer of [...layers.slice(0, 2), ...layers.slice(2).reverse()]) { // in the order of the tables
       const label = make("label"), input = make("input", undefined, { type: "checkbox", checked: layer.shown });
       const swatch = make("span", undefined, { className: "swatch" });
-      swatch.style.background = layer.colour || `var(--${layer.kind === "roads" ? "road" : "truth"})`;
+      layer.swatch = swatch;
       input.addEventListener("change", () => { layer.shown = input.checked; view.redraw(); });
       layer.input = input;
       label.append(input, swatch, layer.name);
       box.append(label);
     }
-    byError.addEventListener("change", view.redraw);
+    byError.addEventListener("change", () => { colourSwatches(); view.redraw(); });
     scrub.addEventListener("input", () => go(Number(scrub.value)));
     const vertices = layers.filter((one) => one.kind === "vertices").at(-1);
     if (vertices) scrub.max = vertices.path.t_s.length - 1;
@@ -64,8 +64,17 @@ function startMap(root) {
     colourBar();
   }
 
+  /** The signs beside the names have the colours that are seen on the map: those of the errors, if vertices are coloured by them. */
+  function colourSwatches() {
+    for (const layer of layers) {
+      const own = layer.colour || `var(--${layer.kind === "roads" ? "road" : "truth"})`;
+      layer.swatch.style.background = layer.kind === "vertices" && byError.checked ? `linear-gradient(90deg, ${ramp().join(",")})` : own;
+    }
+  }
+
   function colourBar() {
     const strip = make("div", undefined, { className: "ramp" }), ends = make("div", undefined, { className: "ends" });
+    colourSwatches();
     strip.style.background = `linear-gradient(90deg, ${ramp().join(",")})`;
     ends.append(...[`${LOWEST_M} m`, "1 m", "10 m", `${HIGHEST_M} m`].map((text) => make("span", text)));
     root.querySelector(".colourbar").replaceChildren(strip, ends);

@@ -17,6 +17,8 @@ from hippodrome.eval.report.tables import plain_table
 # The page asks no server for anything: pictures, style and script are in the file itself.
 POLICY: Final = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 TABLE_SCRIPTS: Final = ("basics.js", "vector.js", "save.js", "tables.js")  # of a page that has tables and pictures only
+UNITS: Final = ("m", "s", "ms", "%")  # after a comma in a head
+WIDE: Final = 6  # columns from which on a table does not fit a phone
 BAD = re.compile(r"^(WORSE|FAILED|failed|refused|MISSED)\b")  # words of a verdict
 GOOD = re.compile(r"^(better|held|aim reached|passed)\b")
 
@@ -96,7 +98,8 @@ def _blocks(text: str) -> Iterator[Html]:
         elif first.startswith("- "):
             yield element("ul", [element("li", _inline(line.removeprefix("- "))) for line in block], class_="definitions")
         else:
-            yield element("p", _inline(" ".join(block)), class_="note")
+            words = " ".join(block)
+            yield element("p", _inline(words[:1].upper() + words[1:]), class_="note")
 
 
 def _parts(text: str) -> Iterator[list[str]]:
@@ -129,11 +132,15 @@ def _inline(text: str) -> Html:
 def _table(lines: Sequence[Sequence[str]], label: str) -> Html:
     """A table in which every figure has a column of its own."""
     heads, *rows = lines
+    same = heads[0] if len(heads) > WIDE and len({row[0] for row in rows}) == 1 and len(rows) > 1 else None
+    if same is not None:  # a column that says the same in all rows takes the place of what one looks for
+        said, heads, rows = rows[0][0], heads[1:], [row[1:] for row in rows]
     columns = [_split(head, [row[place] for row in rows]) for place, head in enumerate(heads)]
     flat = [one for column in columns for one in column]
-    return plain_table(
+    made = plain_table(
         [head for head, _ in flat], [[_toned(cells[place]) for _, cells in flat] for place in range(len(rows))], label
     )
+    return made if same is None else joined(element("p", f"{same[:1].upper()}{same[1:]}: {said}.", class_="note"), made)
 
 
 def _split(head: str, cells: Sequence[str]) -> list[tuple[str, list[str]]]:
@@ -142,7 +149,7 @@ def _split(head: str, cells: Sequence[str]) -> list[tuple[str, list[str]]]:
     parts = names.split(" / ")
     figures = [cell.split(" / ") for cell in cells]
     if len(parts) < 2 or any(len(one) not in (1, len(parts)) for one in figures):
-        return [(head, list(cells))]
+        return [(f"{names} ({unit})" if unit in UNITS else head, list(cells))]
     begin = parts[0].rpartition(" ")[0]
     titles = [parts[0], *(f"{begin} {part}".strip() for part in parts[1:])]
     return [

@@ -26,7 +26,7 @@ def mapping_places(files: ScenarioFiles, town: str) -> Html | None:
     known = {(place.method, place.vertex): place for place in files.why.places} if files.why else {}
     layers = [layer for layer in evidence.methods if method_of(layer.name, layer.frame).frame == "network"]
     groups = []
-    for layer in layers:
+    for layer in reversed(layers):  # in the order of the tables
         cards = [_vertex(layer, vertex, evidence, known.get((layer.name, vertex)), town, files) for vertex in layer.worst]
         groups.append(element("div", element("h4", f"{layer.name}, first drive"), element("div", cards, class_="cards")))
     return joined(groups)
@@ -38,7 +38,7 @@ def localization_places(files: ScenarioFiles, town: str) -> Html | None:
         return None
     groups = [
         element("div", element("h4", f"{belief.name}, second drive"), element("div", cards, class_="cards pairs"))
-        for belief in files.second.beliefs
+        for belief in reversed(files.second.beliefs)
         if (cards := [_step(belief, step, files.second.frames, files.evidence, town, files) for step in worst_steps(belief)])
     ]
     return joined(groups) if groups else None
@@ -46,7 +46,8 @@ def localization_places(files: ScenarioFiles, town: str) -> Html | None:
 
 def _vertex(layer: Layer, vertex: int, evidence: MapEvidence, place: Place | None, town: str, files: ScenarioFiles) -> Html:
     t_s, error_m = layer.t_s[vertex], layer.error_m[vertex] or 0.0
-    words = joined(element("strong", f"{error_m:.2f}{NBSP}m"), element("small", f"vertex {vertex}, {t_s:.0f}{NBSP}s"))
+    when = f"vertex {vertex}, {t_s:.0f}{NBSP}s into the drive"
+    words = joined(element("strong", f"{error_m:.2f}{NBSP}m off"), element("small", when))
     tile = frame_tile(evidence.thumbnails, t_s) if files.thumbnails else None
     button = element("button", tile, words, type="button", class_="goto card",
                      data_method=layer.name, data_vertex=vertex, title="Show on the map")  # fmt: skip
@@ -55,21 +56,23 @@ def _vertex(layer: Layer, vertex: int, evidence: MapEvidence, place: Place | Non
 
 def _vertex_facts(place: Place) -> list[str]:
     """What the map says of a vertex, a line each."""
-    lane = f"lane {place.lane}" + (f" at {place.position_m:.0f}{NBSP}m" if place.position_m is not None else "")
-    facts = [f"{place.status}: {lane}" if place.lane is not None else place.status]
+    along = f", {place.position_m:.0f}{NBSP}m along it" if place.position_m is not None else ""
+    lane = f" to lane {place.lane}{along}" if place.lane is not None else ""
+    facts = [f"Matched{lane}." if place.status == "matched" else f"Road match: {place.status}{lane}."]
     if place.sure_m is not None:
-        facts.append(f"the map says 95{NBSP}% within {place.sure_m:.2f}{NBSP}m")
+        facts.append(f"The map says that it is 95{NBSP}% sure within {place.sure_m:.2f}{NBSP}m.")
     if place.since_closure_m is None:
-        facts.append("no loop was closed before")
+        facts.append("No loop had been closed before.")
     elif place.since_closure_m == 0.0:
-        facts.append(f"closes a loop with the view of {place.closed_with_s:.0f}{NBSP}s")
+        facts.append(f"A loop is closed here, with the view stored at {place.closed_with_s:.0f}{NBSP}s.")
     else:
-        facts.append(f"{place.since_closure_m:.0f}{NBSP}m since a loop was closed (view of {place.closed_with_s:.0f}{NBSP}s)")
-    near = [f"{one.apart_m:.1f}{NBSP}m away, {'no truth' if one.error_m is None else f'{one.error_m:.2f}{NBSP}m off'}"
-            for one in place.neighbours]  # fmt: skip
+        facts.append(f"The last loop was closed {place.since_closure_m:.0f}{NBSP}m before, with the view stored at "
+                     f"{place.closed_with_s:.0f}{NBSP}s.")  # fmt: skip
     if place.lanes:
-        facts.append(f"other lanes: {'; '.join(f'{one.lane}, {one.apart_m:.1f}{NBSP}m away' for one in place.lanes)}")
-    return [*facts, f"other passes: {'; '.join(near)}" if near else "no other pass of this street"]
+        facts.append(f"Other lanes: {', '.join(f'{one.lane} ({one.apart_m:.1f}{NBSP}m away)' for one in place.lanes)}.")
+    near = [f"{'no truth there' if one.error_m is None else f'{one.error_m:.2f}{NBSP}m off'} ({one.apart_m:.1f}{NBSP}m away)"
+            for one in place.neighbours]  # fmt: skip
+    return [*facts, f"Other passes of this street: {', '.join(near)}." if near else "There is no other pass of this street."]
 
 
 def _step(belief: Belief, step: int, frames: Thumbnails, evidence: MapEvidence, town: str, files: ScenarioFiles) -> Html:
@@ -77,14 +80,22 @@ def _step(belief: Belief, step: int, frames: Thumbnails, evidence: MapEvidence, 
     seen = frame_tile(frames, t_s, "tile second") if files.second_frames else None
     fired = frame_tile(evidence.thumbnails, view_s) if files.thumbnails and view_s is not None else None
     facts = [
-        "it says no covariance" if spread is None else f"95{NBSP}% within {_sure_m(spread):.2f}{NBSP}m, it said",
-        f"margin of the last view: {belief.confidence[step]:.2f}",
-        "no view has fired yet" if view_s is None else f"right: view of {view_s:.0f}{NBSP}s, the kept frame nearest to it",
+        "Left: what the camera saw."
+        + (
+            " No view has fired yet."
+            if view_s is None
+            else f" Right: the kept frame nearest to the view that fired, {view_s:.0f}{NBSP}s."
+        ),
+        "It does not say how sure it was."
+        if spread is None
+        else f"It said that it was 95{NBSP}% sure within {_sure_m(spread):.2f}{NBSP}m.",
+        f"The evidence for the last view led that for any other place by {belief.confidence[step]:.2f}.",
     ]
     looks = files.second.looks if files.second else ()
     if views := next((look.views for look in looks if (look.method, look.t_s) == (belief.name, t_s)), None):
-        facts.append(f"this frame alone resembles: {'; '.join(map(_resemblance, views))}")
-    words = joined(element("strong", f"{belief.error_m[step] or 0.0:.2f}{NBSP}m"), element("small", f"{t_s:.0f}{NBSP}s"))
+        facts.append(f"This frame alone resembles the views of {'; '.join(map(_resemblance, views))}.")
+    off_m, when = belief.error_m[step] or 0.0, f"{t_s:.0f}{NBSP}s into the drive"
+    words = joined(element("strong", f"{off_m:.2f}{NBSP}m off"), element("small", when))
     pictures = element("div", seen, fired, class_="pair")
     return element("div", element("div", pictures, words, class_="card"), _list(facts), _link(town, 2, t_s), class_="place")
 

@@ -49,6 +49,7 @@ function startPlayer(root) {
     name = other;
     segments = makeSegments(story, name);
     chart.tell(segments, name);
+    find(".mark.located").style.background = story.colours[(layerOf(story, name) || { name }).name];
     s = share * length();
     redraw();
   }
@@ -151,6 +152,7 @@ function startPlayer(root) {
     if (traces) strip.parentElement.after(saveBox([[`${section.dataset.town}, certainty of the networks`, () => { const svg = traces.vector(secondDrive(story, name)); redraw(); return svg; }]]));
     const select = find(".choice");
     for (const choice of story.choices) select.append(make("option", choice, { value: choice, selected: choice === name }));
+    if (!story.semi) for (const mark of [".own", ".gap"]) find(`.mark${mark}`).parentElement.remove();
     if (story.semi) find(".mark.own").style.background = story.colours[story.semi.name];
     select.closest("label").hidden = story.choices.length < 2;
     select.addEventListener("change", () => choose(select.value));

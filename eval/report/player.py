@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 from hippodrome.eval.report.files import ScenarioFiles
 from hippodrome.eval.report.markup import Html, data_script, element, joined
@@ -11,13 +12,29 @@ from hippodrome.eval.results.model import Results, ScenarioResult
 
 SPEEDS = (("0.25", "¼ speed"), ("0.5", "½ speed"), ("1", "1× speed"), ("2", "2× speed"), ("4", "4× speed"))
 PARTS = (("map", "1 The map grows"), ("roads", "2 It comes right"), ("find", "3 The car finds itself"))
+EXPLAINED = (  # what is seen in the parts of the story that leave room for it
+    ("map", "The car drives through the town; the line behind it is its true path. From camera and wheels alone it makes a map: "
+            "streets connect as they should, but lengths and turns are wrong, so the map lies off the roads. "
+            "The dashed line is the error at this moment."),
+    ("roads", "The map is laid on the road network: every vertex moves to the place at which the roads explain the drive best. "
+              "Its colour is what is left of its error."),
+)  # fmt: skip
 MARKS = (  # sign, meaning, and the parts of the story in which it is seen
+    ("road", "roads", "map roads find"),
     ("truth", "true path", "map roads find"),
     ("own", "semi-metric map", "map roads"),
-    ("ramp", "on the roads: error 0.1 to 100 m", "roads"),
+    ("gap", "error now", "map"),
+    ("ramp", "laid on the roads, by error: 0.1 to 100 m", "roads"),
+    ("located", "localized path", "find"),
     ("fix", "belief (95 %)", "find"),
     ("view", "view that fired", "find"),
     ("modules", "places of each grid module alone", "find"),
+)
+# The signs of the three grid modules as scene.js draws them: square, diamond, circle.
+MODULE_SIGNS: Final = Html(
+    '<svg class="mark modules" viewBox="0 0 46 14" aria-hidden="true" fill="none" stroke-width="2">'
+    '<path d="M2 2h10v10h-10z" stroke="#cc79a7"/><path d="M23 1l6 6l-6 6l-6-6z" stroke="#0072b2"/>'
+    '<circle cx="39" cy="7" r="5.5" stroke="#d55e00"/></svg>'
 )
 BRAIN_PARTS = (  # equations are those of Li et al. 2025
     ("Head-direction ring:", "each cell stands for a heading, and the cells around the believed one are active, Eq. (1)."),
@@ -28,9 +45,14 @@ BRAIN_PARTS = (  # equations are those of Li et al. 2025
     ("Inhibition:", "keeps the activity of a network limited, Eqs. (3) to (5), and lets its two populations compete, "
                     "Eqs. (6) and (7)."),
 )  # fmt: skip
+# Of the methods, in the order in which map.json has them; basics.js draws them in the same.
+COLOURS: Final = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#5b3a9e")
 MODULES = 3  # sheets that there is room for; a belief with fewer hides the others
 
-CARD_WORDS = "plain dot: the car; blue: its map as it grows, then laid on the roads; then a second drive finds itself in it"
+CARD_WORDS = joined(
+    "The plain dot is the car. Blue is its map, which grows and is then laid on the roads. ",
+    "At the end a second drive finds itself in it.",
+)
 
 
 def player(files: ScenarioFiles) -> Html | None:
@@ -49,6 +71,12 @@ def player(files: ScenarioFiles) -> Html | None:
         _transport(bool(files.second and any(one.periods_m for one in files.second.beliefs))),
         class_="player", role="region", aria_label="The drive, playing",
     )  # fmt: skip
+
+
+def method_colours(files: ScenarioFiles) -> dict[str, str]:
+    """The colour of each method that the map shows, by its name."""
+    layers = files.evidence.methods if files.evidence else []
+    return {layer.name: COLOURS[place % len(COLOURS)] for place, layer in enumerate(layers)}
 
 
 def brain_at_work(files: ScenarioFiles) -> Html | None:
@@ -108,13 +136,16 @@ def _moment() -> Html:
 
 def _legend() -> Html:
     """What the marks mean; the colours are those of the map's layers."""
-    items = [element("li", element("i", class_=f"mark {kind}"), words, data_in=parts) for kind, words, parts in MARKS]
+    signs = {kind: MODULE_SIGNS if kind == "modules" else element("i", class_=f"mark {kind}") for kind, _, _ in MARKS}
+    items = [element("li", signs[kind], words, data_in=parts) for kind, words, parts in MARKS]
     return element("ul", items, class_="legend")
 
 
 def _seen(files: ScenarioFiles) -> Html:
     pictures = [_picture("film", "Camera frame"), _picture("fired", "The stored view that fired")] if files.thumbnails else []
-    return element("div", element("div", pictures, class_="frames"), _brain() if files.second else None, class_="seen")
+    words = [element("p", text, class_="explained", data_in=part) for part, text in EXPLAINED]
+    frames = element("div", pictures, class_="frames") if pictures else None
+    return element("div", frames, words, _brain() if files.second else None, class_="seen")
 
 
 def _picture(kind: str, label: str) -> Html:

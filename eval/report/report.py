@@ -61,7 +61,7 @@ def report_html(results: Results, out: Path) -> str:
     body = [
         element("header", element("h1", "Topometric maps, scored"), element("nav", links, class_="tabs", aria_label="Towns")),
         element("main", _all_scenarios(results, found, (out / DRIVE_PAGE).exists()), sections),
-        element("footer", "Made by ", element("code", "hippodrome eval"), "; ", element("code", "hippodrome report DIR"),
+        element("footer", "Made by ", element("code", _maker(results)), "; ", element("code", "hippodrome report DIR"),
                 " makes it again from results.json and the files beside it."),
     ]  # fmt: skip
     return page("hippodrome report", body, SCRIPTS, EARLY)
@@ -84,6 +84,12 @@ def _all_scenarios(results: Results, found: Sequence[ScenarioFiles], has_drives:
         class_="panel",
         id=COMPARE,
     )
+
+
+def _maker(results: Results) -> str:
+    """The command that made the results."""
+    has_maps = any(without_missions(one).rows for one in results.scenarios)
+    return "hippodrome eval" if has_maps or not results.scenarios else "hippodrome drive"
 
 
 def _lede(results: Results) -> Html:

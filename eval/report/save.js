@@ -21,7 +21,8 @@ async function asPng(image, scale) {
 
 /** Print one figure on a page of its own size; "save as PDF" is what every browser's print offers. */
 async function printFigure(image) {
-  const { naturalWidth: w, naturalHeight: h } = image, size = make("style", `@page { size: ${w}px ${h}px; margin: 0; }`);
+  const { naturalWidth: w, naturalHeight: h } = image; // rounded: a page of exactly this height may be too low by a part of a pixel
+  const size = make("style", `@page { size: ${w}px ${h + 1}px; margin: 0; }`);
   image.className = "print-figure";
   image.alt = "the figure that is printed";
   document.body.append(image);

@@ -1,6 +1,7 @@
 // The player's map: one moment of a story, drawn. Roads and truth are drawn once per view and copied afterwards.
 
-const HEAD_PX = 62, FOOT_PX = 24; // above and below a large map, for its words and its legend
+const HEAD_PX = 62, FOOT_PX = 30; // above and below a large map, for its words and its legend
+const NARROW_PX = 520, NARROW_HEAD_PX = 78, NARROW_FOOT_PX = 66; // on a phone both take more lines
 const MODULE_COLOURS = ["#cc79a7", "#0072b2", "#d55e00"]; // of the grid modules' places
 const INFORMED = 5; // reliability in 1/rad^2 below which a module's phase means nothing
 const showModules = { on: true };
@@ -25,10 +26,16 @@ function makeScene(canvas, story) {
   let view = null, inks = null;
   const X = (x) => view.x + view.scale * x, Y = (y) => view.y - view.scale * y;
 
+  /** Room for words above and below the map. */
+  function margins(w) {
+    if (!canvas.matches(".scene")) return [0, 0];
+    return w < NARROW_PX ? [NARROW_HEAD_PX, NARROW_FOOT_PX] : [HEAD_PX, FOOT_PX];
+  }
+
   function resize() {
     const w = canvas.clientWidth, h = canvas.clientHeight, ratio = window.devicePixelRatio || 1;
     if (!w || !h) return (view = null);
-    const [x0, y0, x1, y1] = bounds, [head, foot] = canvas.matches(".scene") ? [HEAD_PX, FOOT_PX] : [0, 0], room = h - head - foot;
+    const [x0, y0, x1, y1] = bounds, [head, foot] = margins(w), room = h - head - foot;
     const scale = 0.9 * Math.min(w / Math.max(x1 - x0, 1), room / Math.max(y1 - y0, 1));
     view = { w, h, ratio, scale, x: w / 2 - scale * (x0 + x1) / 2, y: head + room / 2 + scale * (y0 + y1) / 2 };
     inks = inksOf(canvas, ["road", "truth", "soft", "accent", "bad", "good", "paper", "ink"]);

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hippodrome.eval.report import comparison
@@ -12,21 +12,26 @@ from hippodrome.eval.report.drives import TITLE, mission_table, without_missions
 from hippodrome.eval.report.evidence import MapEvidence
 from hippodrome.eval.report.files import Picture, ScenarioFiles
 from hippodrome.eval.report.markup import Child, Html, data_script, element, joined
+from hippodrome.eval.report.meanings import meanings
 from hippodrome.eval.report.places import localization_places, mapping_places
-from hippodrome.eval.report.player import brain_at_work, player
+from hippodrome.eval.report.player import brain_at_work, method_colours, player
 from hippodrome.eval.report.tables import (
     anchor,
     break_table,
     localization_table,
     mapping_table,
     plain_table,
+    row_heads,
     scrolling,
+    swatch,
 )
 from hippodrome.eval.results.aligned import aligned_note
 from hippodrome.eval.results.model import Row, ScenarioResult
-from hippodrome.eval.results.tables import definitions, failed_runs, scenario_title, unscored_notes
+from hippodrome.eval.results.tables import LOCALIZATION_COLUMNS, MAPPING_COLUMNS, definitions, failed_runs, unscored_notes
 from hippodrome.eval.results.thresholds import limits_missed
 
+NBSP = "\N{NO-BREAK SPACE}"
+WIDE_PX = 1400  # a figure that is wider is given a row of its own, else its letters are too small
 MEANING = {"cpu_s": "s of CPU", "step_ms": "ms a step"}  # of a time, by the end of its name
 
 
@@ -43,18 +48,18 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
     failures, scenario = _failures(scenario), without_missions(scenario)
     if not scenario.rows and missions:
         return _driven_section(place, scenario, verdict, failures, missions)
-    rows = (*scenario.rows, *quoted)
+    rows, colours = (*scenario.rows, *quoted), method_colours(files)
     return element(
         "section",
         element("h2", scenario.name, " ", verdict),
         player(files),
-        element("p", scenario_title(scenario), class_="note"),
+        element("p", _driven(scenario), class_="note"),
         failures,
-        _headline(scenario),
+        _headline(scenario, colours),
         element("h3", "Mapping (Table I)"),
-        mapping_table(scenario, quoted),
+        mapping_table(scenario, quoted, colours),
         element("p", note, class_="note") if (note := aligned_note(rows)) is not None else None,
-        _titled("Localization from an unknown start (Table II)", localization_table(scenario, quoted)),
+        _titled("Localization from an unknown start (Table II)", localization_table(scenario, quoted, colours)),
         _titled("Ten sequences from unknown starts (Table II)", comparison.sequences(files.sequences)),
         _titled("Cheaper than ORB-SLAM3", comparison.ratios(files.ratios)),
         _titled("What each method is given", comparison.fairness(scenario)),
@@ -92,7 +97,23 @@ def _driven_section(place: int, scenario: ScenarioResult, verdict: Html | None, 
     )
 
 
+def _driven(scenario: ScenarioResult) -> str:
+    """What was driven, in two sentences."""
+    network = scenario.network
+    town = f"The road network {network.path}" if network.path is not None else f"A generated town of the kind {network.generator}"
+    return (
+        f"{town}, with {network.km:.1f}{NBSP}km of road; seed {scenario.seed}, noise level {scenario.noise}. "
+        f"The first drive took {scenario.duration_s:,.0f}{NBSP}s and {scenario.frames:,} camera frames."
+    )
+
+
 def _definitions(rows: Sequence[Row]) -> Html:
+    """The heads in plain English, and the definitions to the letter."""
+    heads = [*row_heads(MAPPING_COLUMNS, rows), *row_heads(LOCALIZATION_COLUMNS, [row for row in rows if row.localization])]
+    return joined(meanings(heads), element("p", "To the letter, as results.json has it:"), _exact_definitions(rows))
+
+
+def _exact_definitions(rows: Sequence[Row]) -> Html:
     return element("ul", [element("li", line) for line in definitions(rows)], class_="definitions")
 
 
@@ -126,26 +147,25 @@ def _extra(scenario: ScenarioResult, name: str) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _headline(scenario: ScenarioResult) -> Html:
+def _headline(scenario: ScenarioResult, colours: Mapping[str, str]) -> Html:
     """One tile per method with its APE and its localization error, the last row first, as it is what a run is about."""
-    return element("div", [_tile(row) for row in reversed(scenario.rows)], class_="tiles")
+    return element("div", [_tile(row, colours) for row in reversed(scenario.rows)], class_="tiles")
 
 
-def _tile(row: Row) -> Html:
+def _tile(row: Row, colours: Mapping[str, str]) -> Html:
+    name = element("span", swatch(colours.get(row.method)), row.method)
     if row.ape is None and row.places is not None:
         right = element("strong", f"{100.0 * row.places.best_is_right:.0f} %")
-        return element("div", element("span", row.method), right, element("small", "of the places right"), class_="figure-tile")
+        return element("div", name, right, element("small", "of the places right"), class_="figure-tile")
     if row.ape is None:
-        return element("div", element("span", row.method), element("strong", "failed", class_="bad"), class_="figure-tile")
+        return element("div", name, element("strong", "failed", class_="bad"), class_="figure-tile")
     if row.refused is not None:
         small = element("small", f"nothing vouches for its {row.ape.mean_m:.0f}\N{NO-BREAK SPACE}m")
-        return element(
-            "div", element("span", row.method), element("strong", "refused", class_="bad"), small, class_="figure-tile"
-        )
+        return element("div", name, element("strong", "refused", class_="bad"), small, class_="figure-tile")
     details = [f"mean APE, worst {row.ape.max_m:.1f}\N{NO-BREAK SPACE}m" if row.ape.max_m is not None else "mean APE"]
     if row.localization is not None and row.localization.error_mean_m is not None:
         details.append(f"localized to {row.localization.error_mean_m:.2f}\N{NO-BREAK SPACE}m")
-    return element("div", element("span", row.method), element("strong", f"{row.ape.mean_m:.2f} m"),
+    return element("div", name, element("strong", f"{row.ape.mean_m:.2f} m"),
                    [element("small", line) for line in details], class_="figure-tile")  # fmt: skip
 
 
@@ -185,7 +205,7 @@ def gallery(pictures: Sequence[Picture]) -> Html:
 def _figure(picture: Picture) -> Html:
     image = element("img", src=picture.uri, alt=picture.caption, width=picture.width, height=picture.height)
     button = element("button", image, type="button", class_="enlarge", aria_label=f"Enlarge: {picture.caption}")
-    kinds = " ".join(kind for kind, has in (("wide", picture.width > 1400), ("photo", picture.photo)) if has) or None
+    kinds = " ".join(kind for kind, has in (("wide", picture.width > WIDE_PX), ("photo", picture.photo)) if has) or None
     drawn = Html(f'<script type="text/plain">{picture.svg}</script>') if picture.svg else None
     return element("figure", button, drawn, element("figcaption", picture.caption), class_=kinds)
 

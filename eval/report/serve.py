@@ -7,6 +7,7 @@ import json
 import re
 import zipfile
 from collections.abc import Iterator
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote, unquote, urlsplit
@@ -32,10 +33,17 @@ class ServeError(HippodromeError):
 
 
 def make_server(folder: Path, port: int) -> http.server.ThreadingHTTPServer:
-    """A server of one folder, on this machine's own address; port 0 lets the system choose. Raises ServeError."""
+    """A server of one folder, on this machine's own address; port 0 lets the system choose.
+
+    Raises:
+        ServeError: The port cannot be had, or what is given is a file.
+    """
 
     class Handler(_Handler):
         root = folder
+
+    if folder.exists() and not folder.is_dir():
+        raise ServeError(f"{folder}: is a file; give the folder of a run, as its --out has it")
 
     try:
         return http.server.ThreadingHTTPServer((ADDRESS, port), Handler)
@@ -44,12 +52,23 @@ def make_server(folder: Path, port: int) -> http.server.ThreadingHTTPServer:
         raise ServeError(f"port {port}: {reason}; name another with --port, or --port 0 for any that is free") from error
 
 
+def missing_note(folder: Path) -> str | None:
+    """What is said of a folder that is not there, with one of a similar name beside it if there is one; None if it is there."""
+    if folder.is_dir():
+        return None
+    beside = [one.name for one in _folders(folder.parent)]
+    near = next(iter(get_close_matches(folder.name, beside, n=1)), None)
+    meant = f"; did you mean {folder.parent / near}?" if near else "; if none is to begin there, the name is mistyped"
+    return f"{folder}: there is no such folder yet, and the page waits for a run that makes it{meant}"
+
+
 def state(folder: Path) -> dict[str, Any]:
     """How far the runs in a folder are, as plain data: stages, drives with the frames that are drawn, figures and pages."""
     runs = [one for one in (folder, *_folders(folder)) if (one / PROGRESS).exists() or one == folder]
     progress = [found for one in runs if (found := read_progress(one)) is not None]
     return {
         "folder": folder.name or str(folder),
+        "missing": missing_note(folder),
         "plan": list(progress[-1].plan) if progress else [],
         "stages": [stage.model_dump() for stage in progress[-1].stages] if progress else [],
         "drives": [drive for one in (folder, *_folders(folder)) for drive in _drives(folder, one / "recordings")],

@@ -46,7 +46,9 @@ function asLatex(heads, rows) {
 
 /** What the figures under a head mean, from the definitions of the same section. */
 function meaningOf(table, text) {
-  const name = text.replace(/ (median|p95|max)\b/, "").replace(/ \((m|m driven|ms|%)\)$/, ""), section = table.closest("section");
+  const section = table.closest("section"), plain = [...(section ? section.querySelectorAll(".meanings li") : [])].find((one) => one.dataset.head === text);
+  if (plain) return textOf(plain);
+  const name = text.replace(/ (median|p95|max)\b/, "").replace(/ \((m|m driven|ms|%)\)$/, "");
   const aliases = { Error: "localization", "Error p95": "localization", "First fix": "localization", Localized: "localization" };
   const wanted = (aliases[name] || name).toLowerCase();
   return [...(section ? section.querySelectorAll(".definitions li") : [])].map(textOf).filter((line) => line.toLowerCase().startsWith(`${wanted} (`)).join("; ");

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Final
 
@@ -28,9 +28,9 @@ SPLIT: Final = {  # headings of cells that hold several figures, and those of on
 }
 
 
-def row_head(name: Child) -> Html:
+def row_head(name: Child, sign: Html | None = None) -> Html:
     """The first cell of a row; a long name may break anywhere, so that it leaves room for the figures."""
-    return element("th", name, scope="row", class_="long" if len(re.sub("<[^>]*>", "", joined(name))) > LONG else None)
+    return element("th", sign, name, scope="row", class_="long" if len(re.sub("<[^>]*>", "", joined(name))) > LONG else None)
 
 
 def scrolling(table: Html, label: str) -> Html:
@@ -39,10 +39,21 @@ def scrolling(table: Html, label: str) -> Html:
 
 
 def plain_table(heads: Sequence[str], rows: Sequence[Sequence[Child]], label: str) -> Html:
-    """A table with the first column to the left and the others to the right; ``label`` names it for screen readers."""
-    head = element("tr", [element("th", title, scope="col") if title else element("td") for title in heads])
-    body = [element("tr", row_head(row[0]), [element("td", cell) for cell in row[1:]]) for row in rows]
+    """A table with words to the left and figures to the right; ``label`` names it for screen readers."""
+    kinds = [None, *("text" if _is_words([row[place] for row in rows]) else None for place in range(1, len(heads)))]
+    head = element("tr", [element("th", title, scope="col", class_=kind) if title else element("td")
+                          for title, kind in zip(heads, kinds, strict=True)])  # fmt: skip
+    body = [
+        element("tr", row_head(row[0]), [element("td", cell, class_=kind) for cell, kind in zip(row[1:], kinds[1:], strict=True)])
+        for row in rows
+    ]
     return scrolling(element("table", element("thead", head), element("tbody", body)), label)
+
+
+def _is_words(cells: Sequence[Child]) -> bool:
+    """Whether no cell of a column begins with a figure."""
+    texts = [re.sub("<[^>]*>", "", joined(cell)).strip() for cell in cells]
+    return any(text not in ("", NONE) for text in texts) and not any(re.match(r"[<(+-]?\s*\d", text) for text in texts)
 
 
 def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Sequence[Child]], label: str) -> Html:
@@ -53,12 +64,20 @@ def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Se
         rows: The cells.
         label: Names the table for screen readers.
     """
-    top, below = [], []
+    top, below, begins = [], [], set()  # columns with which a group begins: a line parts them from those before
+    column = 0
     for title, heads in groups:
         spans: dict[str, str | int] = {"colspan": len(heads), "scope": "colgroup"} if heads else {"rowspan": 2, "scope": "col"}
-        top.append(element("th", title, **spans))
-        below += [element("th", head, scope="col") for head in heads]
-    body = [element("tr", row_head(row[0]), [element("td", cell) for cell in row[1:]]) for row in rows]
+        begin = "begin" if heads else None
+        top.append(element("th", title, class_=begin, **spans))
+        below += [element("th", head, scope="col", class_=begin if head == heads[0] else None) for head in heads]
+        begins |= {column} if heads else set()
+        column += len(heads) or 1
+    body = [
+        element("tr", row_head(row[0]),
+                [element("td", cell, class_="begin" if place in begins else None) for place, cell in enumerate(row[1:], start=1)])
+        for row in rows
+    ]  # fmt: skip
     head = element("thead", element("tr", top, class_="groups"), element("tr", below))
     return scrolling(element("table", head, element("tbody", body)), label)
 
@@ -96,15 +115,15 @@ def anchor(place: int) -> str:
     return f"scenario-{place + 1}"
 
 
-def mapping_table(scenario: ScenarioResult, quoted: Sequence[Row]) -> Html:
+def mapping_table(scenario: ScenarioResult, quoted: Sequence[Row], colours: Mapping[str, str]) -> Html:
     """The paper's Table I with our rows above its own, in the order of the tiles: the last one is what a run is about."""
-    return _row_table(MAPPING_COLUMNS, [*reversed(scenario.rows), *quoted], f"{scenario.name}: mapping")
+    return _row_table(MAPPING_COLUMNS, [*reversed(scenario.rows), *quoted], f"{scenario.name}: mapping", colours)
 
 
-def localization_table(scenario: ScenarioResult, quoted: Sequence[Row]) -> Html | None:
+def localization_table(scenario: ScenarioResult, quoted: Sequence[Row], colours: Mapping[str, str]) -> Html | None:
     """Localization from an unknown start (the paper's Table II); None if nothing was localized."""
     rows = [row for row in (*reversed(scenario.rows), *quoted) if row.localization is not None]
-    return _row_table(LOCALIZATION_COLUMNS, rows, f"{scenario.name}: localization") if rows else None
+    return _row_table(LOCALIZATION_COLUMNS, rows, f"{scenario.name}: localization", colours) if rows else None
 
 
 def break_table(scenario: ScenarioResult) -> Html | None:
@@ -117,11 +136,20 @@ def break_table(scenario: ScenarioResult) -> Html | None:
     return plain_table(["Method", "Vertices", "Status", "Cause"], rows, "breaks") if rows else None
 
 
-def _row_table(columns: Sequence[Column], rows: Sequence[Row], label: str) -> Html:
+def row_heads(columns: Sequence[Column], rows: Sequence[Row]) -> list[str]:
+    """The heads of the table of these rows, that of the methods' names first."""
+    return [column.title for column in _row_columns(columns, rows)]
+
+
+def _row_columns(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
     filled = sorted(filled_columns(columns, rows)[1:], key=lambda column: column.title not in FIRST)
-    columns = [columns[0], *(part for column in filled for part in _parts(column))]
+    return [columns[0], *(part for column in filled for part in _parts(column))]
+
+
+def _row_table(columns: Sequence[Column], rows: Sequence[Row], label: str, colours: Mapping[str, str]) -> Html:
+    columns = _row_columns(columns, rows)
     head = element("tr", [element("th", column.title, scope="col") for column in columns])
-    body = [_row_line(row_cells(columns, row), row) for row in rows]
+    body = [_row_line(row_cells(columns, row), row, colours.get(row.method)) for row in rows]
     return scrolling(element("table", element("thead", head), element("tbody", body)), label)
 
 
@@ -136,9 +164,14 @@ def _part(column: Column, place: int, row: Row) -> str:
     return parts[place] if place < len(parts) else NONE
 
 
-def _row_line(cells: Sequence[str], row: Row) -> Html:
+def swatch(colour: str | None) -> Html | None:
+    """A dot of the colour that a method has on the maps and in the figures; None for a method that they do not show."""
+    return element("i", class_="swatch", style=f"background:{colour}") if colour else None
+
+
+def _row_line(cells: Sequence[str], row: Row, colour: str | None) -> Html:
     style = "failed" if row.failure is not None or row.refused is not None else "quoted" if row.quoted else None
-    return element("tr", row_head(cells[0]), [element("td", cell) for cell in cells[1:]], class_=style)
+    return element("tr", row_head(cells[0], swatch(colour)), [element("td", cell) for cell in cells[1:]], class_=style)
 
 
 def _row(scenario: ScenarioResult, method: str) -> Row | None:

@@ -15,6 +15,8 @@ function openPanel(panel) {
     const own = link.hash === `#${panel.id}`;
     link.setAttribute("aria-selected", own);
     link.tabIndex = own ? 0 : -1;
+    const row = link.parentElement; // of tabs that do not all fit, the one that is shown is in sight
+    if (own) row.scrollLeft = link.offsetLeft - row.offsetLeft - (row.clientWidth - link.offsetWidth) / 2;
   }
 }
 

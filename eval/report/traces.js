@@ -2,7 +2,8 @@
 
 const TRACE_ROWS = [["head_reliability", "head direction"], ["grid_reliability", "grid cells"]];
 const RISE = 1.02; // between injections reliabilities only fall: a calibration population that is surer than before was injected into
-const WIDE_PX = 480; // from this width on there is room for all words
+const WIDE_PX = 480, LEGEND_PX = 760; // from these widths on there is room for all words, and for the names of the lines
+const POPULATION_NAMES = ["integrator", "calibration"]; // in the order of POPULATIONS
 const TRACE_LEFT = 8, TRACE_HEAD = 18;
 
 /** Mean of a population's reliabilities in a sample: even entries of pairs are the integrator's, odd ones the calibration's. */
@@ -45,8 +46,9 @@ function makeTraces(canvas) {
     const Y = (value) => top + tall - 6 - ((value - low) / Math.max(high - low, 1e-9)) * (tall - TRACE_HEAD - 10);
     const marks = injections(drawn);
     on.fillStyle = inks.soft;
-    const range = `${sigma(10 ** low)} to ${sigma(10 ** high)}`, wide = `${name}: sure from ${range}, log scale; ticks: ${marks.length} injections`;
-    on.fillText(size.w < WIDE_PX ? `${name}: ${range}, ${marks.length} injections` : wide, TRACE_LEFT, top + 12);
+    const range = `${sigma(10 ** low)} to ${sigma(10 ** high)}`, wide = `${name}: certainty from ${range}, on a log scale; ticks: the ${marks.length} injections`;
+    on.fillText(size.w < WIDE_PX ? `${name}: ${range}, ${marks.length} injections` : wide, TRACE_LEFT + 5, top + 12);
+    if (size.w >= LEGEND_PX && top === 0) drawLegend(on);
     on.fillStyle = inks.accent;
     for (const i of marks) on.fillRect(X(drawn.t_s[i]), top + TRACE_HEAD, 1, 5);
     series.forEach((values, population) => {
@@ -55,6 +57,19 @@ function makeTraces(canvas) {
       on.beginPath();
       values.forEach((value, i) => on[i ? "lineTo" : "moveTo"](X(drawn.t_s[i]), Y(value)));
       on.stroke();
+    });
+  }
+
+  /** Which line is which population, at the right. */
+  function drawLegend(on) {
+    let x = size.w - TRACE_LEFT;
+    POPULATION_NAMES.forEach((words, population) => {
+      x -= on.measureText(words).width;
+      on.fillStyle = inks.soft;
+      on.fillText(words, x, 12);
+      on.fillStyle = `rgb(${POPULATIONS[population].join(",")})`;
+      on.fillRect(x - 17, 7, 12, 3);
+      x -= 32;
     });
   }
 

@@ -93,11 +93,19 @@ function startVersus(root) {
     const gaps = both.t_s.map((_, i) => { const { x, y } = vertex(pane, i, inks); return Math.hypot(X(x) - (event.clientX - box.left), Y(y) - (event.clientY - box.top)); });
     go(gaps.indexOf(gaps.reduce((a, b) => Math.min(a, b))));
   });
+  /** What the colours of the maps of A and B stand for. */
+  function scale() {
+    const strip = make("span", undefined, { className: "ramp" });
+    strip.style.background = `linear-gradient(90deg, ${ramp().join(",")})`;
+    root.querySelector(".versus-scale").replaceChildren("Error in A and B: ", `${LOWEST_M} m `, strip, ` ${HIGHEST_M} m`);
+  }
+
   const town = root.closest("section").dataset.town;
   root.append(saveBox(canvases.map((canvas) => [`${town}, ${canvas.dataset.pane}`, () => onPaper(canvas, canvas, (svg) => paint(svg, canvas))])));
   choose(both.name);
   new ResizeObserver(draw).observe(root);
-  dark.addEventListener("change", draw);
+  dark.addEventListener("change", () => { scale(); draw(); });
+  scale();
 }
 
 for (const root of document.querySelectorAll(".versus")) startVersus(root);

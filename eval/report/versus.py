@@ -71,7 +71,7 @@ def write_versus(
         "the error is the same within a tenth of a metre or of itself."
     )
     body = [
-        element("header", element("h1", f"{before.name or before} and {after.name or after}")),
+        element("header", element("h1", " and ".join(_titles(before, after)))),
         element(
             "main",
             element("p", f"A is {before}, B is {after}. {words}", class_="lede"),
@@ -81,6 +81,15 @@ def write_versus(
         element("footer", "Made by ", element("code", f"hippodrome compare {before} {after} --html"), "; it is no test."),
     ]  # fmt: skip
     write_atomically(path, page("hippodrome compare", body, SCRIPTS).encode())
+
+
+def _titles(before: Path, after: Path) -> tuple[str, str]:
+    """The ends of both paths, as short as they can be while they differ."""
+    for count in range(1, max(len(before.parts), len(after.parts)) + 1):
+        names = ["/".join(path.parts[-count:]) or str(path) for path in (before, after)]
+        if names[0] != names[1]:
+            return names[0], names[1]
+    return str(before), str(after)
 
 
 def _list(lines: Sequence[str]) -> Html | None:
@@ -108,7 +117,7 @@ def _section(folders: tuple[Path, Path], name: str) -> Html | None:
                 element("div", element("label", "Map ", element("select", class_="choice")),
                         element("label", "Place ", element("input", type="range", min=0, value=0, class_="scrub")),
                         element("span", "", class_="said", role="status"), class_="transport"),
-                element("div", class_="places"), class_="versus"),
+                element("div", class_="places"), element("div", class_="versus-scale"), class_="versus"),
         data_town=name,
     )  # fmt: skip
 

@@ -18,25 +18,26 @@ from hippodrome.eval.methods.method import (
 from hippodrome.eval.results.model import Row
 
 OURS: Final = "hippodrome"  # source of the methods that come with us
+CAMERA: Final = "frames of one small camera, self-motion"
 HEAD: Final = ("Method", "Is given", "Frame of its APE", "What favours or burdens it")
 
 # By the label of the method, or of the system that it is a variant of: both trajectories of ORB-SLAM3 have one entry.
 GIVEN: Final[dict[str, tuple[str, str, str]]] = {
     DEAD_RECKONING.label: ("self-motion", "start pose, no scale", "no frame, no map: what the others begin with"),
     SEMI_METRIC.label: (
-        "frames of one small camera, self-motion",
+        CAMERA,
         "start pose, no scale",
         "its shape is right, its metres are not",
     ),
-    RATSLAM.label: ("the same", "start pose, no scale", "constants of OpenRatSLAM, not tuned to these towns"),
-    NO_ATTRACTOR.label: ("the same", "start pose, no scale", "the semi-metric map's poses to the last bit"),
+    RATSLAM.label: (CAMERA, "start pose, no scale", "constants of OpenRatSLAM, not tuned to these towns"),
+    NO_ATTRACTOR.label: (CAMERA, "start pose, no scale", "the semi-metric map's poses to the last bit"),
     TOPOMETRIC_PAPER.label: (
-        "the same, the road network, the start pose",
+        f"{CAMERA}, the road network, the start pose",
         "network, no alignment",
         "the network is metric and drawn from the truth, wheels and gyro bridge what the camera misses; no alignment helps it",
     ),
     TOPOMETRIC.label: (
-        "the same, the road network",
+        f"{CAMERA}, the road network",
         "network, no alignment",
         "the network is metric and drawn from the truth, wheels and gyro bridge what the camera misses; no alignment helps it",
     ),

@@ -17,6 +17,7 @@ from rich.text import Text
 from hippodrome.eval.results import markdown
 from hippodrome.eval.results.aligned import aligned_note
 from hippodrome.eval.results.model import ErrorSummary, Results, Row, ScenarioResult
+from hippodrome.eval.results.terminal import wrapped_title
 
 QUOTED_MARK: Final = "†"
 QUOTED_NOTE: Final = f"{QUOTED_MARK} quoted from the paper, another drive in another simulator; not measured here"
@@ -206,7 +207,8 @@ def print_table_one(results: Results, quoted: Sequence[Row], console: Console) -
 
 
 def _terminal_table(title: str, rows: Sequence[Row]) -> Table:
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, title=Text(title, style="bold"), title_justify="left")
+    words = Text(wrapped_title(title), style="bold")
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, title=words, title_justify="left")
     table.add_column("method", min_width=18, max_width=20)
     for column in TERMINAL_COLUMNS:
         table.add_column(column.title, justify="right", no_wrap=True, min_width=4)

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+import re
+import textwrap
+from typing import Any, Final
 
 from rich.console import Console
 from rich.text import Text
+
+NBSP: Final = "\N{NO-BREAK SPACE}"
+TITLE_WIDTH: Final = 79  # of the lines above a table, in letters
 
 
 class PlainConsole(Console):
@@ -21,3 +26,9 @@ class PlainConsole(Console):
 def harmless(text: str) -> str:
     """Text whose control characters are spaces, but for the ends of its lines."""
     return "".join(character if character.isprintable() or character == "\n" else " " for character in text)
+
+
+def wrapped_title(title: str) -> str:
+    """A title in lines that fit a table, in which no figure is parted from its unit."""
+    bound = re.sub(r"(?<=\d) (?=\w)", NBSP, title)
+    return "\n".join(textwrap.wrap(bound, TITLE_WIDTH, break_on_hyphens=False)).replace(NBSP, " ")

@@ -17,8 +17,23 @@ from hippodrome.eval.sweep.grid import SweepCell
 
 NONE = "-"  # what stands for a figure that there is not
 NOTE = "Means, percentiles and maxima are over the samples of all runs together; the worst run is the one with the greatest mean."
-HEAD = ("setting", "method", "runs", "failed", "APE mean (m)", "median", "p95", "max", "worst run", "RPE 20 m (m)",
-        "localized", "localization mean (m)", "p95", "max", "false fixes")  # fmt: skip
+HEAD = (
+    "setting",
+    "method",
+    "runs",
+    "failed",
+    "APE mean (m)",
+    "APE median (m)",
+    "APE p95 (m)",
+    "APE max (m)",
+    "worst run (m)",
+    "RPE 20 m (m)",
+    "localized",
+    "localization mean (m)",
+    "localization p95 (m)",
+    "localization max (m)",
+    "false fixes",
+)
 
 
 def pooled_rows(finished: Mapping[SweepCell, CellResult]) -> list[dict[str, Any]]:

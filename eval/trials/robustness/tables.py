@@ -18,12 +18,19 @@ from hippodrome.eval.trials.robustness.targets import Target, worst
 
 NONE: Final = "-"  # what stands for a figure without a sample
 FIGURES: Final = (
-    "success", "error mean / p95 / worst, m", "localized after median / max, m", "off the map, error", "false", "localized",
-    "NEES",
+    "success", "error mean / p95 / worst, m", "localized after median / max, m", "off the map", "error there, m", "false",
+    "localized", "NEES",
 )  # fmt: skip
 PAPER_HEAD: Final = (
-    "sequence", "length, m", "error median, m", "mean, m", "p95, m", "off the map, m", "localized after, m", "false fixes",
-)  # fmt: skip
+    "sequence",
+    "length, m",
+    "error median, m",
+    "error mean, m",
+    "error p95, m",
+    "error off the map, m",
+    "localized after, m",
+    "false fixes",
+)
 TOWNS_DEFINITION: Final = (
     "All: pooled from the samples of all towns, with one threshold of place recognition for them all. Verdicts: by the pooled "
     "figure, and by the worst town's."
@@ -121,7 +128,7 @@ def failures_markdown(failures: Sequence[Failure]) -> str:
         + f"; again: `{one.options}`"
         for one in failures
     ]
-    return _part("## Failures", lines or ["none"])
+    return _part("## Failures", lines or ["None."])
 
 
 def _part(title: str, lines: Sequence[str], definition: str | None = None) -> str:
@@ -135,7 +142,8 @@ def _cells(row: dict[str, Any]) -> list[str]:
         NONE if row["success_share"] is None else f"{100 * row['success_share']:.0f} % of {row['judged']}",
         _figures(row, "error_mean_m", "error_p95_m", "worst_sequence_mean_m"),
         _figures(row, "localized_after_median_m", "localized_after_max_m"),
-        f"{_percent(row['off_map_share'])}, {_figures(row, 'off_map_error_mean_m')}",
+        _percent(row["off_map_share"]),
+        _figures(row, "off_map_error_mean_m"),
         f"{row['false_sequences']} of {row['sequences']}",
         _percent(row["localized_share"]),
         _figures(row, "nees"),

@@ -12,9 +12,22 @@ from hippodrome.eval.trials.stress.rows import FAR_M, WRONG_M, StressRow
 
 TO_BE_REFUSED: Final = ("another town", "self-similar grid")  # the drive never was there, or may have been anywhere in it
 HEAD: Final = (
-    "case", "runs", "refused", "APE mean (m)", "median", "p90", "worst run", "worst vertex", "RPE 20 m (m)", "vouched (%)",
-    "right (%)", "> 5 m (%)", "wrong vertices", "NEES", "CPU (s)",
-)  # fmt: skip
+    "case",
+    "runs",
+    "refused",
+    "APE mean (m)",
+    "APE median (m)",
+    "APE p90 (m)",
+    "worst run (m)",
+    "worst vertex (m)",
+    "RPE 20 m (m)",
+    "vouched (%)",
+    "right (%)",
+    "> 5 m (%)",
+    "wrong vertices",
+    "NEES",
+    "CPU (s)",
+)
 NOTES: Final = (
     "APE: distance of a vertex from the truth in the network's frame, without alignment, over the vertices that the refinement",
     "vouches for: a run's mean, and over runs mean, median, 90th percentile and worst. RPE: over 20 m of driving, all vertices.",

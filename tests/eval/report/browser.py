@@ -142,6 +142,8 @@ class Tab:
 
     def frame_work_ms(self, seconds):
         """Milliseconds of CPU that the page's own scripts, styles and layout took in each frame, from the browser's trace."""
+        # What an earlier trace told is not of these seconds.
+        self.browser.events = [one for one in self.browser.events if one.get("method") != "Tracing.dataCollected"]
         self.call("Tracing.start", transferMode="ReportEvents", traceConfig={"includedCategories": ["devtools.timeline"]})
         time.sleep(seconds)
         self.call("Tracing.end")

@@ -81,7 +81,7 @@ def test_a_belief_in_the_map_of_another_method_is_a_choice_of_its_own(browser, r
 
 def test_candidates_stand_below_the_worst_moments(report):
     text = Page(report.read_text(encoding="utf-8")).text().replace("\N{NO-BREAK SPACE}", " ")
-    assert "this frame alone resembles: 30 s (score 4.5, 0.5 m off); 0 s (score 2.0, no truth)" in text
+    assert "This frame alone resembles the views of 30 s (score 4.5, 0.5 m off); 0 s (score 2.0, no truth)" in text
 
 
 def test_no_script_makes_markup_of_data(report):

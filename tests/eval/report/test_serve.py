@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hippodrome.eval.files.progress import PROGRESS, Progress, Stage
-from hippodrome.eval.report.serve import ServeError, make_server, state
+from hippodrome.eval.report.serve import ServeError, make_server, missing_note, state
 from tests.eval.report.test_pages import look_at
 
 PNG = cv2.imencode(".png", np.full((12, 16, 3), 90, np.uint8))[1].tobytes()
@@ -47,7 +47,9 @@ def get(address, host=None):
 
 def test_says_how_far_the_run_is_and_gives_frames_and_figures(served):
     folder, address = served
-    assert state(folder) == {"folder": "run", "plan": [], "stages": [], "drives": [], "figures": [], "pages": []}
+    nothing = state(folder)
+    assert "there is no such folder yet" in nothing.pop("missing")
+    assert nothing == {"folder": "run", "plan": [], "stages": [], "drives": [], "figures": [], "pages": []}
     begin(folder)
     (folder / "town").mkdir()
     (folder / "town" / "a map.png").write_bytes(PNG)
@@ -84,7 +86,7 @@ def test_a_port_in_use_is_a_sentence(served):
 def test_the_page_fills_while_the_run_goes_on(browser, served, width, dark):
     folder, address = served
     tab = browser.open(f"{address}/", width=width, dark=dark)
-    tab.until("document.querySelector('.live-state').textContent === 'waiting'")
+    tab.until("document.querySelector('.live-state').textContent === 'no such folder'")
     begin(folder)
     tab.until("document.querySelector('.live-state').textContent === 'under way'")
     assert tab.run("document.querySelector('.live-words').textContent") == "At work: render, 1 of 4. Next: seal."
@@ -94,3 +96,13 @@ def test_the_page_fills_while_the_run_goes_on(browser, served, width, dark):
     tab.until("document.querySelector('.live-pages a')?.href.endsWith('/report.html')")
     assert tab.run("document.querySelector('.live-state').textContent") == "done"
     look_at(tab)
+
+
+def test_a_folder_that_is_not_there_is_said_with_what_may_be_meant(tmp_path):
+    (tmp_path / "eval").mkdir()
+    assert missing_note(tmp_path / "eval") is None
+    assert missing_note(tmp_path / "evla").endswith(f"did you mean {tmp_path / 'eval'}?")
+    assert "the name is mistyped" in missing_note(tmp_path / "quite another" / "one")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ServeError, match="is a file; give the folder of a run"):
+        make_server(tmp_path / "file", 0)

@@ -13,6 +13,7 @@ from hippodrome.eval.results.model import (
 )
 from hippodrome.eval.results.paper_rows import quoted_rows
 from hippodrome.eval.results.tables import QUOTED_MARK, print_table_one, table_one_markdown
+from hippodrome.eval.results.terminal import wrapped_title
 
 
 def error(mean_m, definition="APE, no alignment"):
@@ -127,3 +128,10 @@ def test_why_a_drive_without_truth_has_no_errors_is_said_once_for_all_its_method
     rows = tuple(Row(method=name, unscored="the truth is not known", cpu_percent=1.0) for name in ("semi-metric", "topometric"))
     markdown = table_one_markdown(Results(scenarios=(scenario.model_copy(update={"rows": rows}),)), [])
     assert markdown.count("not scored (semi-metric, topometric): the truth is not known") == 1
+
+
+def test_a_title_parts_no_figure_from_its_unit():
+    title = "radial: generated, radial, 2.9 km of road, seed 1, noise paper, 2,694 frames, 539 s"
+    lines = wrapped_title(title).splitlines()
+    assert lines[-1] == "539 s" and " ".join(lines) == title
+    assert max(map(len, lines)) < 80

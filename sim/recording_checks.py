@@ -22,6 +22,7 @@ PNG_HEAD: Final = struct.Struct(">8s4x4sII")  # signature, length and name of th
 MOST: Final = {
     "t_s": 1e11, "dt_s": 3600.0, "speed": 1e6, "yaw_rate_radps": 1e4, "poses_m": 1e9, "speed_mps": 1e4, "lane_position_m": 1e7,
 }  # fmt: skip
+LEAST_SPEED: Final = 1e-9  # the fastest of a drive that moves; in kilometres a second, a walk is a thousand times as fast
 TIMES_AGREE_S: Final = 0.5  # and half of a step: what a step lasts and when it ends are told twice, and only one may be believed
 CHECKSUM: Final = "manifest_sha256"  # of all else in a manifest; recordings of before it was written have none
 TRUTH: Final = ("poses_m", "speed_mps", "lane_position_m")  # nan where it is unknown
@@ -45,6 +46,9 @@ def check_samples(arrays: Mapping[str, np.ndarray[Any, Any]], most_steps: int) -
     for name, most in MOST.items():
         unknown = np.isnan(arrays[name]) if name in TRUTH else False
         _require((np.abs(arrays[name].astype(np.float64)) <= most) | unknown, name, f"not finite, or beyond {most:g}")
+    fastest = float(np.max(np.abs(arrays["speed"].astype(np.float64))))
+    if 0.0 < fastest < LEAST_SPEED:
+        raise ValueError(f"speed is {fastest:g} at most, which no sensor tells from zero")
     _require(arrays["dt_s"] > 0.0, "dt_s", "not above zero")
     _require(np.diff(arrays["t_s"]) > 0.0, "t_s", "followed by an earlier or the same one")
     between_s, lasts_s = np.diff(arrays["t_s"].astype(np.float64)), arrays["dt_s"][1:].astype(np.float64)

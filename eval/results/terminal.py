@@ -7,6 +7,8 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
+from hippodrome._output import harmless
+
 
 class PlainConsole(Console):
     """A console for names that come from files: ``[red]`` is text in it, and control characters are spaces."""
@@ -16,8 +18,3 @@ class PlainConsole(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         return super().render_str(harmless(text), **{**options, "markup": False, "emoji": False})
-
-
-def harmless(text: str) -> str:
-    """Text whose control characters are spaces, but for the ends of its lines."""
-    return "".join(character if character.isprintable() or character == "\n" else " " for character in text)

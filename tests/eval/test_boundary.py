@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 import hippodrome.eval.cli
+from hippodrome._output import one_line
 from hippodrome._processes import Terminated
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.cli import main
-from hippodrome.eval.commands.boundary import guarded, machine_fault, make_numba_cache, one_line
+from hippodrome.eval.commands.boundary import guarded, machine_fault, make_numba_cache
 
 SOURCE = Path(hippodrome.eval.cli.__file__).parents[1]
 HIPPODROME = [sys.executable, "-m", "hippodrome.eval.cli"]

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from hippodrome._files import read_bounded, why_unreadable
 from hippodrome._native import unheard
 from hippodrome.core.types import Frame
 from hippodrome.eval.exchange.drives.errors import ExchangeError
@@ -30,7 +31,9 @@ def decode(frame: ForeignFrame) -> Frame:
         with Image.open(io.BytesIO(blob)) as header:  # reads no pixel
             width, height = header.size
             turned = header.getexif().get(ORIENTATION, 1) in QUARTER_TURNS
-    except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+    except UnidentifiedImageError:
+        raise ExchangeError(f"{frame.name}: not an image of a known kind ({len(blob)} bytes)") from None
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise ExchangeError(f"{frame.name}: not an image ({' '.join(str(error).split())[:80]})") from None
     if width * height > MAX_PIXELS or min(width, height) < 16:
         raise ExchangeError(f"{frame.name}: {width} x {height} pixels; at least 16 a side, at most {MAX_PIXELS} in all")
@@ -48,8 +51,8 @@ def file_frame(t_s: float, path: Path) -> ForeignFrame:
         try:
             if (size := path.stat().st_size) > MAX_IMAGE_BYTES:
                 raise ExchangeError(f"{path}: {size} bytes, the limit is {MAX_IMAGE_BYTES}")
-            return path.read_bytes()
+            return read_bounded(path, MAX_IMAGE_BYTES)
         except OSError as error:
-            raise ExchangeError(f"{path}: cannot be read: {error.strerror}") from None
+            raise ExchangeError(f"{path}: cannot be read: {why_unreadable(error)}") from None
 
     return ForeignFrame(t_s, str(path), load)

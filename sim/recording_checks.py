@@ -17,6 +17,8 @@ from hippodrome.core.types import Frame
 MAX_FRAME_BYTES: Final = 64 << 20  # of one image in its file; 12 megapixels of noise take 36 MB
 MAX_PIXELS: Final = 64_000_000  # of one image: some bytes can claim any size
 PNG_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
+PNG_CHUNK: Final = struct.Struct(">I4s")  # length and kind, before what it holds and its checksum
+PNG_CRC_BYTES: Final = 4
 PNG_HEAD: Final = struct.Struct(">8s4x4sII")  # signature, length and name of the first chunk, width, height
 # Largest absolute values of what a drive is made of. Speeds are in map units, whose length is unknown: from millimetres up.
 MOST: Final = {
@@ -99,6 +101,7 @@ def decoded_png(blob: bytes) -> Frame:
         raise ValueError("not a PNG image")
     if not 0 < width * height <= MAX_PIXELS:
         raise ValueError(f"{width} x {height} pixels, the limit is {MAX_PIXELS} in all")
+    require_png_chunks(blob)
     try:
         with unheard():
             image = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
@@ -107,6 +110,18 @@ def decoded_png(blob: bytes) -> Frame:
     if image is None:
         raise ValueError("not a whole PNG image")
     return np.ascontiguousarray(image[:, :, ::-1], dtype=np.uint8)
+
+
+def require_png_chunks(blob: bytes) -> None:
+    """Raise ValueError if a chunk of a PNG file is longer than the file: OpenCV takes the memory that it claims, up to 2 GiB."""
+    at = len(PNG_SIGNATURE)
+    while at + PNG_CHUNK.size <= len(blob):
+        length, kind = PNG_CHUNK.unpack_from(blob, at)
+        at += PNG_CHUNK.size + length + PNG_CRC_BYTES
+        if at > len(blob):
+            raise ValueError(f"not a whole PNG image: its part {ascii(kind)[2:-1]} claims {length} bytes")
+        if kind == b"IEND":
+            return
 
 
 def _require(holds: np.ndarray[Any, Any], name: str, complaint: str, first: int = 0) -> None:

@@ -15,6 +15,7 @@ from hippodrome._native import unheard
 from hippodrome.core.types import Frame
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignFrame
+from hippodrome.sim.recording_checks import PNG_SIGNATURE, require_png_chunks
 
 MAX_IMAGE_BYTES: Final = 64 << 20
 MAX_PIXELS: Final = 64_000_000  # a hostile image can claim any size in a few bytes
@@ -37,6 +38,11 @@ def decode(frame: ForeignFrame) -> Frame:
         raise ExchangeError(f"{frame.name}: not an image ({' '.join(str(error).split())[:80]})") from None
     if width * height > MAX_PIXELS or min(width, height) < 16:
         raise ExchangeError(f"{frame.name}: {width} x {height} pixels; at least 16 a side, at most {MAX_PIXELS} in all")
+    try:
+        if blob.startswith(PNG_SIGNATURE):
+            require_png_chunks(blob)
+    except ValueError as error:
+        raise ExchangeError(f"{frame.name}: {error}") from None
     with unheard():
         image: Any = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)  # turns it as the camera was held
     if image is None or image.shape[:2] not in ((height, width), (width, height) if turned else (height, width)):

@@ -7,10 +7,11 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
+from hippodrome._output import one_line
 from hippodrome.eval.commands.arguments import Command, HelpLayout, print_help
 from hippodrome.eval.commands.authoring import add_scenario_command
 from hippodrome.eval.commands.board import add_board_command
-from hippodrome.eval.commands.boundary import guarded, make_numba_cache, one_line
+from hippodrome.eval.commands.boundary import guarded, make_numba_cache
 from hippodrome.eval.commands.drive import add_mission_command
 from hippodrome.eval.commands.exchange import add_exchange_commands
 from hippodrome.eval.commands.gate import add_gate_commands

@@ -21,6 +21,7 @@ import cv2
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from hippodrome._output import terminal
 from hippodrome._processes import ENDING, die_with_parent, end_children
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.files.progress import Teller
@@ -162,7 +163,7 @@ def progress_bar() -> Progress:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    console = Console(stderr=True)
+    console = Console(file=terminal(sys.stderr))
     return Progress(*columns, console=console, disable=not console.is_terminal)
 
 

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from hippodrome._files import why_unreadable
+from hippodrome._files import open_regular, why_unreadable
 from hippodrome.core.types import FloatArray, HippodromeError, StartPose
 from hippodrome.sim.geo_start import GeoStart
 
@@ -135,7 +135,7 @@ def placed_start(start: StartPose | GeoStart | None, network: Path, mode: str = 
 def _location(net_file: Path) -> dict[str, str]:
     parser: Any = ElementTree.XMLPullParser(["start"])
     try:
-        with net_file.open("rb") as raw:
+        with open_regular(net_file) as raw:
             packed = raw.read(2) == b"\x1f\x8b"
         with gzip.open(net_file) if packed else net_file.open("rb") as stream:
             for _ in range(MAX_HEAD_BYTES >> 16):

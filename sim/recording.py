@@ -84,7 +84,11 @@ class Recording:
 
 @lru_cache(maxsize=4)
 def _open_chunk(path: Path, _modified_ns: int) -> zipfile.ZipFile:
-    return zipfile.ZipFile(path)
+    archive = zipfile.ZipFile(path)
+    names = archive.namelist()
+    if len(names) != len(set(names)):
+        raise ValueError("two of its members have the same name")
+    return archive
 
 
 def chunk_path(folder: Path, chunk: int) -> Path:

@@ -17,11 +17,14 @@ from hippodrome.core.types import Frame
 MAX_FRAME_BYTES: Final = 64 << 20  # of one image in its file; 12 megapixels of noise take 36 MB
 MAX_PIXELS: Final = 64_000_000  # of one image: some bytes can claim any size
 PNG_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
+PNG_CHUNK: Final = struct.Struct(">I4s")  # length and kind, before what it holds and its checksum
+PNG_CRC_BYTES: Final = 4
 PNG_HEAD: Final = struct.Struct(">8s4x4sII")  # signature, length and name of the first chunk, width, height
 # Largest absolute values of what a drive is made of. Speeds are in map units, whose length is unknown: from millimetres up.
 MOST: Final = {
     "t_s": 1e11, "dt_s": 3600.0, "speed": 1e6, "yaw_rate_radps": 1e4, "poses_m": 1e9, "speed_mps": 1e4, "lane_position_m": 1e7,
 }  # fmt: skip
+LEAST_SPEED: Final = 1e-9  # the fastest of a drive that moves; in kilometres a second, a walk is a thousand times as fast
 TIMES_AGREE_S: Final = 0.5  # and half of a step: what a step lasts and when it ends are told twice, and only one may be believed
 CHECKSUM: Final = "manifest_sha256"  # of all else in a manifest; recordings of before it was written have none
 TRUTH: Final = ("poses_m", "speed_mps", "lane_position_m")  # nan where it is unknown
@@ -45,6 +48,9 @@ def check_samples(arrays: Mapping[str, np.ndarray[Any, Any]], most_steps: int) -
     for name, most in MOST.items():
         unknown = np.isnan(arrays[name]) if name in TRUTH else False
         _require((np.abs(arrays[name].astype(np.float64)) <= most) | unknown, name, f"not finite, or beyond {most:g}")
+    fastest = float(np.max(np.abs(arrays["speed"].astype(np.float64))))
+    if 0.0 < fastest < LEAST_SPEED:
+        raise ValueError(f"speed is {fastest:g} at most, which no sensor tells from zero")
     _require(arrays["dt_s"] > 0.0, "dt_s", "not above zero")
     _require(np.diff(arrays["t_s"]) > 0.0, "t_s", "followed by an earlier or the same one")
     between_s, lasts_s = np.diff(arrays["t_s"].astype(np.float64)), arrays["dt_s"][1:].astype(np.float64)
@@ -95,6 +101,7 @@ def decoded_png(blob: bytes) -> Frame:
         raise ValueError("not a PNG image")
     if not 0 < width * height <= MAX_PIXELS:
         raise ValueError(f"{width} x {height} pixels, the limit is {MAX_PIXELS} in all")
+    require_png_chunks(blob)
     try:
         with unheard():
             image = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
@@ -103,6 +110,18 @@ def decoded_png(blob: bytes) -> Frame:
     if image is None:
         raise ValueError("not a whole PNG image")
     return np.ascontiguousarray(image[:, :, ::-1], dtype=np.uint8)
+
+
+def require_png_chunks(blob: bytes) -> None:
+    """Raise ValueError if a chunk of a PNG file is longer than the file: OpenCV takes the memory that it claims, up to 2 GiB."""
+    at = len(PNG_SIGNATURE)
+    while at + PNG_CHUNK.size <= len(blob):
+        length, kind = PNG_CHUNK.unpack_from(blob, at)
+        at += PNG_CHUNK.size + length + PNG_CRC_BYTES
+        if at > len(blob):
+            raise ValueError(f"not a whole PNG image: its part {ascii(kind)[2:-1]} claims {length} bytes")
+        if kind == b"IEND":
+            return
 
 
 def _require(holds: np.ndarray[Any, Any], name: str, complaint: str, first: int = 0) -> None:

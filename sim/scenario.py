@@ -68,7 +68,7 @@ class Scenario(Spec):
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
     town: TownSpec = TownSpec()
     camera: CameraSpec = CameraSpec()
-    odometry_rate_hz: Annotated[float, Field(gt=0, le=200)] = 10.0
+    odometry_rate_hz: Annotated[float, Field(ge=0.01, le=200)] = 10.0
     noise: NoiseLevel | SelfMotionNoise = "paper"
     mapping: DriveSpec = DriveSpec(tour=TourSpec(length_m=3600))
     localization: DriveSpec = DriveSpec(tour=TourSpec(length_m=1200))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import IO, Any, Final, cast
 from xml.parsers import expat
 
+from hippodrome._files import open_regular
 from hippodrome.core.types import HippodromeError
 
 PIECE_BYTES: Final = 1 << 14
@@ -54,7 +55,7 @@ def root_of(file: Path, named: Path | None = None) -> tuple[str, dict[str, str]]
 
 def opened(file: Path) -> IO[Any]:
     """The bytes of a file, unpacked where it is packed with gzip, whatever its name."""
-    with file.open("rb") as stream:
+    with open_regular(file) as stream:
         is_packed = stream.read(2) == b"\x1f\x8b"
     return cast(IO[Any], gzip.open(file)) if is_packed else file.open("rb")
 

@@ -6,6 +6,7 @@ may use it. They import the standard library, one another and ``HippodromeError`
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import stat
@@ -13,6 +14,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from io import BufferedReader
 from pathlib import Path
 from typing import Final
 
@@ -84,16 +86,28 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
         OSError: It cannot be read, is larger, or is no regular file: a device never ends, and a named pipe waits for a writer.
         HippodromeError: It has a name that no file can have.
     """
-    try:
-        with open(path, "rb", opener=_open_without_waiting) as stream:
-            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-                raise OSError("not a regular file")
-            data: bytes = stream.read(most_bytes + 1)
-    except ValueError as error:  # a null byte in the name
-        raise HippodromeError(f"{str(path)!r}: not the name of a file: {error}") from error
+    with open_regular(path) as stream:
+        data = stream.read(most_bytes + 1)
     if len(data) > most_bytes:
         raise OSError(f"more than {most_bytes} bytes, the limit")
     return data
+
+
+def open_regular(path: Path) -> BufferedReader:
+    """A file that somebody names, open to be read. A device or a named pipe, of which nobody knows when it ends, is none.
+
+    Raises:
+        OSError: It cannot be opened, or is no regular file.
+        HippodromeError: It has a name that no file can have.
+    """
+    try:
+        stream = open(path, "rb", opener=_open_without_waiting)  # noqa: SIM115  # who asked for it closes it
+    except ValueError as error:  # a null byte in the name
+        raise HippodromeError(f"{str(path)!r}: not the name of a file: {error}") from error
+    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+        stream.close()
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
+    return stream
 
 
 def why_unreadable(error: Exception) -> str:
@@ -111,7 +125,7 @@ def _open_without_waiting(name: str, flags: int) -> int:
 
 def sha256_of(path: Path) -> str:
     """SHA-256 of a file as 64 hexadecimal digits. The file is read in pieces, so it may be larger than memory."""
-    with path.open("rb") as stream:
+    with open_regular(path) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array, identity
 from scipy.sparse.linalg import SuperLU, splu
 
-from hippodrome.core.types import FloatArray, IntArray
+from hippodrome.core.types import FloatArray, HippodromeError, IntArray
 
 Linearise: TypeAlias = Callable[[FloatArray], tuple[FloatArray, csr_array]]
 HALVINGS = 8  # how often a step that raises the cost is halved; 2^-8 of a Gauss-Newton step is no progress worth having
@@ -57,8 +57,17 @@ def factorise(matrix: csc_array) -> SuperLU:
 
     SciPy has no sparse Cholesky: this LU keeps its pivots on the diagonal and one order for rows and columns, and so costs and
     fills in no more than Cholesky would.
+
+    Raises:
+        HippodromeError: The matrix is singular.
     """
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    try:
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError as error:  # SciPy has no other one for it
+        raise HippodromeError(
+            f"the poses of the drive cannot be told from its measurements ({error}): distances or errors are all but zero; "
+            "check the speeds and their unit"
+        ) from error
 
 
 def block_jacobian(blocks: list[tuple[FloatArray, IntArray]], state_size: int) -> csr_array:

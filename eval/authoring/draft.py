@@ -14,6 +14,7 @@ import yaml
 
 from hippodrome._files import write_atomically
 from hippodrome._folders import temporary_folder
+from hippodrome._output import one_line
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.files.scenarios import PACKAGE, located
@@ -149,7 +150,7 @@ def scenario_text(
     """The text of the scenario's file, with comments."""
     return TEMPLATE.format(
         title=_title(source, around),
-        file=path,
+        file=one_line(str(path)),
         name=_scalar(name),
         town=_town_line(source, path, driving_side, around),
         rate_hz=draft.rate_hz,
@@ -166,7 +167,7 @@ def _title(source: str, around: Around | None) -> str:
     if source in KINDS:
         return f"A generated town, {source}."
     within = f" within {around}" if around else ""
-    return f"The roads of {Path(source).name}{within}."
+    return f"The roads of {one_line(Path(source).name)}{within}."
 
 
 def _town_line(source: str, path: Path, driving_side: Choice, around: Around | None) -> str:
@@ -174,8 +175,8 @@ def _town_line(source: str, path: Path, driving_side: Choice, around: Around | N
     if source in KINDS:
         return f"town: {_flow(_shipped_town(source, driving_side))}"
     if around or _is_imported(source):
-        return f"town: {{network: {_scalar(f'{path.stem}.net.xml.gz')}}}  # made by netconvert; netedit opens it"
-    return f"town: {{network: {_scalar(source if source.startswith(PACKAGE) else _relative(source, path))}}}"
+        return f"town: {_flow({'network': f'{path.stem}.net.xml.gz'})}  # made by netconvert; netedit opens it"
+    return f"town: {_flow({'network': source if source.startswith(PACKAGE) else _relative(source, path)})}"
 
 
 def _tour_words(draft: Draft) -> str:

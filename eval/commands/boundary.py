@@ -13,10 +13,12 @@ from pathlib import Path
 from typing import Final
 
 from hippodrome._folders import folder_of_this_process
+from hippodrome._output import harmless_output, one_line
 from hippodrome._processes import Terminated, ending_like_an_interrupt
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, INTERRUPTED, OUR_FAULT
 
+FAULT: Final = "fault-of-hippodrome-"  # not as our temporary folders begin, which the next command sweeps
 TRACEBACK: Final = "HIPPODROME_TRACEBACK"  # set it to see the traceback of a fault on the terminal
 RESUMES: Final = "what was finished is kept, the same command resumes"
 
@@ -28,6 +30,11 @@ def guarded(command: Callable[[], int]) -> int:
     of ours, whose traceback goes to a file; signals have 128 and their number.
     """
     _print_what_the_terminal_can()
+    with harmless_output():
+        return _guarded(command)
+
+
+def _guarded(command: Callable[[], int]) -> int:
     try:
         with ending_like_an_interrupt():
             status = command()
@@ -45,6 +52,8 @@ def guarded(command: Callable[[], int]) -> int:
         return _say(f"interrupted; {RESUMES}", INTERRUPTED)
     except OSError as error:
         return _say(machine_fault(error), BAD_INPUT)
+    except UnicodeEncodeError as error:  # what came from a file's name, or from JSON, and cannot be written as text
+        return _say(_no_text(error), BAD_INPUT)
     except MemoryError:
         return _say("out of memory; close other programs, use fewer --workers, or a smaller input", BAD_INPUT)
     except Exception as error:
@@ -107,6 +116,12 @@ def _can_write(folder: Path) -> bool:
         return False
 
 
+def _no_text(error: UnicodeEncodeError) -> str:
+    """Which name or text has a character that no file can hold, a half of a pair or a byte that was no UTF-8."""
+    around = error.object[max(0, error.start - 40) : error.end + 40]
+    return f"'{ascii(around)[1:-1]}': a name or a text that cannot be written in {error.encoding}; rename the file, or the thing"
+
+
 def _our_fault(error: Exception) -> str:
     """Write the traceback to a file, or to the terminal if it is asked for there; the sentence that says so."""
     text = "".join(traceback.format_exception(error))
@@ -115,7 +130,7 @@ def _our_fault(error: Exception) -> str:
         print(text, file=sys.stderr)
     else:
         with suppress(OSError):
-            handle, name = tempfile.mkstemp(prefix="hippodrome-fault-", suffix=".txt")
+            handle, name = tempfile.mkstemp(prefix=FAULT, suffix=".txt")
             with os.fdopen(handle, "w", encoding="utf-8", errors="replace") as stream:
                 stream.write(text)
             where = f" with {name}"
@@ -131,17 +146,11 @@ def _say(line: str, status: int) -> int:
     return status
 
 
-def one_line(text: str) -> str:
-    """Text that can neither break the line nor command the terminal: names come from files."""
-    return " ".join("".join(character if character.isprintable() else " " for character in text).split())
-
-
 def _print_what_the_terminal_can() -> None:
     """Characters that the terminal or the pipe has no code for are printed as escapes; else they would end the command."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, ValueError, OSError):
-            if (stream.encoding or "").lower().replace("-", "") != "utf8":
-                stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
 
 
 def _let_go_of_output_if_it_fails() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from hippodrome._output import harmless
 from hippodrome.eval.results.model import Results, drive_of
-from hippodrome.eval.results.terminal import harmless
 
 COLUMNS: Final = (  # heading, key, format, factor
     ("goal %", "success_rate", ".0f", 100.0),

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from hippodrome._files import write_atomically
+from hippodrome._files import open_regular, write_atomically
 from hippodrome.core.types import HippodromeError, Trajectory
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.lever import Ahead, at_axle
@@ -229,7 +229,7 @@ def _origin_s(drive: Recording) -> float:
 def _is_map(path: Path) -> bool:
     """Whether a file is a map, by its first bytes; one that cannot be opened is left to the reader to complain about."""
     try:
-        with path.open("rb") as stream:
+        with open_regular(path) as stream:
             return stream.read(len(MAGIC)) == MAGIC or path.suffix == ".pbstream"
     except OSError:
         return path.suffix == ".pbstream"

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from hippodrome._files import read_bounded, why_unreadable
 from hippodrome.eval.metrics.association import TrajectoryError
 
 MAX_FIX_BYTES: Final = 128 << 20  # a day of GPX at 10 Hz
@@ -30,9 +31,9 @@ def file_bytes(path: Path) -> bytes:
     try:
         if (size := path.stat().st_size) > MAX_FIX_BYTES:
             raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_FIX_BYTES}; cut the track to the drive")
-        return path.read_bytes()
+        return read_bounded(path, MAX_FIX_BYTES)
     except OSError as error:
-        raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
+        raise TrajectoryError(f"{path}: cannot be read: {why_unreadable(error)}") from None
 
 
 def file_text(path: Path, data: bytes) -> str:

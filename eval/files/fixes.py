@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from hippodrome._files import open_regular
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.files.fix_values import RANGE_ERROR_M, Fix, as_number, file_bytes, file_text, hdop_note, time_s
 from hippodrome.eval.files.nmea import nmea_fixes
@@ -22,6 +23,7 @@ LAT_NAMES: Final = ("lat", "latitude", "lat_deg", "latitude_deg")
 LON_NAMES: Final = ("lon", "lng", "long", "longitude", "lon_deg", "longitude_deg")
 SIGMA_NAMES: Final = ("sigma_m", "sigma", "accuracy", "accuracy_m", "horizontal_accuracy", "h_acc", "hacc", "pos_accuracy")
 HDOP_NAMES: Final = ("hdop",)
+WORST_SIGMA_M: Final = 1e7  # a quarter of the way round the Earth
 OXTS_ACCURACY: Final = 23  # column of pos_accuracy, metres
 
 
@@ -43,7 +45,7 @@ def is_fix_file(path: Path) -> bool:
     if path.suffix.lower() in (".gpx", ".nmea", ".geojson"):
         return True
     try:
-        with path.open("rb") as stream:
+        with open_regular(path) as stream:
             head = stream.read(4096)
     except OSError:
         return False
@@ -79,7 +81,7 @@ def read_fixes(path: Path) -> Fixes:
 
 def _checked(path: Path, rows: Sequence[Fix], notes: list[str]) -> Fixes:
     if not rows:
-        raise TrajectoryError(f"{path}: no fixes with a time in it")
+        raise TrajectoryError(f"{path}: no fixes with a time in it{' (' + '; '.join(notes) + ')' if notes else ''}")
     table = np.array([(row.t_s, row.lat_deg, row.lon_deg, row.sigma_m) for row in rows])
     wrong = ~(np.isfinite(table[:, :3]).all(axis=1) & (np.abs(table[:, 1]) <= 90.0) & (np.abs(table[:, 2]) <= 180.0))
     if wrong.any():
@@ -97,6 +99,11 @@ def _checked(path: Path, rows: Sequence[Fix], notes: list[str]) -> Fixes:
     if (dropped := int((~kept).sum())) > 0:
         notes.append(f"{dropped} fix(es) with the time of the one before are left out")
     table = table[kept]
+    none = (table[:, 3] <= 0.0) | (table[:, 3] > WORST_SIGMA_M)
+    if none.any():
+        first = int(np.flatnonzero(none)[0])
+        notes.append(f"{int(none.sum())} fix(es) have an accuracy that is none ({table[first, 3]:g} m): taken as not known")
+        table[none, 3] = np.nan
     sigma_m = table[:, 3] if np.isfinite(table[:, 3]).any() else None
     return Fixes(table[:, 0], table[:, 1], table[:, 2], sigma_m, tuple(notes))
 
@@ -146,7 +153,10 @@ def _csv(path: Path, text: str, notes: list[str]) -> Iterator[Fix]:
         if line.startswith("#"):
             continue
         where = f"{path}: line {number}"
-        words = next(csv.reader([line], delimiter=separator))
+        try:
+            words = next(csv.reader([line], delimiter=separator))
+        except csv.Error as error:
+            raise TrajectoryError(f"{where}: {error}") from None
         if len(words) < len(names):
             raise TrajectoryError(f"{where}: {len(words)} columns, the first line names {len(names)}")
         accuracy = np.nan

@@ -62,7 +62,10 @@ def _nmea_deg(word: str, side: str, where: str) -> float:
     digits = word.partition(".")[0]
     if len(digits) < 3 or side not in ("N", "S", "E", "W"):
         raise TrajectoryError(f"{where}: '{word[:20]},{side[:2]}' is no place (ddmm.mmmm,N)")
-    degrees = as_number(digits[:-2], where) + as_number(word[len(digits) - 2 :], where) / 60.0
+    minutes = as_number(word[len(digits) - 2 :], where)
+    if not 0.0 <= minutes < 60.0:
+        raise TrajectoryError(f"{where}: '{word[:20]}' has {minutes:g} minutes of arc, a degree has 60")
+    degrees = as_number(digits[:-2], where) + minutes / 60.0
     return -degrees if side in ("S", "W") else degrees
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hippodrome._files import why_unreadable
+from hippodrome._files import read_bounded, why_unreadable
 from hippodrome.eval.files.trajectories import MAX_BYTES
 from hippodrome.eval.metrics.association import TrajectoryError
 
@@ -14,7 +14,7 @@ def text_lines(path: Path) -> list[str]:
     try:
         if (size := path.stat().st_size) > MAX_BYTES:
             raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
-        return path.read_text(encoding="utf-8-sig").splitlines()
+        return read_bounded(path, MAX_BYTES).decode("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise TrajectoryError(f"{path}: cannot be read as text: {why_unreadable(error)}") from None
 

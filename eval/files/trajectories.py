@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from hippodrome._files import why_unreadable, write_atomically
+from hippodrome._files import read_bounded, why_unreadable, write_atomically
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.metrics.association import TrajectoryError, check_trajectory
 
@@ -74,7 +74,7 @@ def read_lines(path: Path) -> list[str]:
     try:
         if (size := path.stat().st_size) > MAX_BYTES:
             raise TrajectoryError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
-        data = path.read_bytes()
+        data = read_bounded(path, MAX_BYTES)
         if (count := data.count(b"\n")) > MAX_LINES:
             raise TrajectoryError(f"{path}: {count} lines, the limit is {MAX_LINES}")
         return data.decode("utf-8-sig").splitlines()

@@ -9,6 +9,8 @@ from typing import Any, Final
 from rich.console import Console
 from rich.text import Text
 
+from hippodrome._output import harmless
+
 NBSP: Final = "\N{NO-BREAK SPACE}"
 TITLE_WIDTH: Final = 79  # of the lines above a table, in letters
 
@@ -21,11 +23,6 @@ class PlainConsole(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         return super().render_str(harmless(text), **{**options, "markup": False, "emoji": False})
-
-
-def harmless(text: str) -> str:
-    """Text whose control characters are spaces, but for the ends of its lines."""
-    return "".join(character if character.isprintable() or character == "\n" else " " for character in text)
 
 
 def wrapped_title(title: str) -> str:

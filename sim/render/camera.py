@@ -18,7 +18,7 @@ class CameraSpec(Spec):
     width: int = Field(default=160, ge=16, le=4096)
     height: int = Field(default=120, ge=16, le=4096)
     fov_deg: float = Field(default=90.0, ge=20.0, le=150.0)  # horizontal
-    rate_hz: float = Field(default=10.0, gt=0.0, le=200.0)
+    rate_hz: float = Field(default=10.0, ge=0.01, le=200.0)
     height_m: float = Field(default=1.4, ge=0.3, le=5.0)  # above the road
     forward_m: float = Field(default=1.6, ge=-5.0, le=10.0)  # from the rear axle to the windscreen
     yaw_offset_deg: float = Field(default=0.0, ge=-180.0, le=180.0)  # counter-clockwise, a camera mounted askew

@@ -9,10 +9,12 @@ from pathlib import Path
 import pytest
 
 import hippodrome.eval.cli
+from hippodrome._folders import sweep_temporary
+from hippodrome._output import one_line
 from hippodrome._processes import Terminated
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.cli import main
-from hippodrome.eval.commands.boundary import guarded, machine_fault, make_numba_cache, one_line
+from hippodrome.eval.commands.boundary import guarded, machine_fault, make_numba_cache
 
 SOURCE = Path(hippodrome.eval.cli.__file__).parents[1]
 HIPPODROME = [sys.executable, "-m", "hippodrome.eval.cli"]
@@ -54,6 +56,18 @@ def test_our_own_fault_is_told_apart_and_its_traceback_kept(capsys, tmp_path, mo
     monkeypatch.setenv("HIPPODROME_TRACEBACK", "1")
     assert guarded(raising(ZeroDivisionError())) == 70
     assert "Traceback (most recent call last)" in capsys.readouterr().err
+
+
+def test_the_report_of_a_fault_outlives_the_next_command(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert guarded(raising(ZeroDivisionError())) == 70
+    sweep_temporary()
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_what_is_printed_cannot_command_the_terminal(capsys):
+    assert guarded(lambda: print("a\x1b]0;x\x07b\u202ec\udcff\nd\te", "\r") or 0) == 0
+    assert capsys.readouterr().out == "a ]0;x b c \nd\te  \n"
 
 
 def test_a_fault_is_told_where_no_file_can_be_written(capsys, monkeypatch):

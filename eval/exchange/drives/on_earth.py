@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hippodrome._files import open_regular
 from hippodrome.core.types import CognitiveMap, FloatArray, MatchStatus, Trajectory
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.exported import ExportedDrive
@@ -78,7 +79,7 @@ def placed_drive(drive: ExportedDrive) -> list[Place]:
 def placed_file(source: Path, network: Path) -> Place:
     """A map or a TUM trajectory in the network's frame. Raises HippodromeError."""
     reference = read_georeference(network)
-    with source.open("rb") as stream:
+    with open_regular(source) as stream:
         is_map = stream.read(len(MAGIC)) == MAGIC
     if not is_map:
         return _line(source.stem, read_tum(source), reference, None)

@@ -147,6 +147,8 @@ def _messages(path: Path, channels: Mapping[int, _Topic], chosen: Chosen, spool:
         if topic is None or topic.name not in found or not topic.kind:
             continue
         name = f"{path}: {topic.name} at {record.log_time} ns"
+        if not record.data:  # protobuf would take it for a message whose every number is 0
+            raise ExchangeError(f"{name}: a message of no bytes; `mcap filter` cuts it out, or record the drive anew")
         try:
             message = topic.decode(record.data)
         except Exception as error:  # every decoder has its own

@@ -19,6 +19,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Message, Schema
 
+from hippodrome._files import open_regular
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 
 MAGIC: Final = b"\x89MCAP0\r\n"
@@ -47,7 +48,7 @@ def records(path: Path, reach: Reach) -> Iterator[Schema | Channel | Message]:
     the file went.
     """
     size = path.stat().st_size
-    with path.open("rb") as stream:
+    with open_regular(path) as stream:
         if (begin := stream.read(len(MAGIC))) != MAGIC:
             raise ExchangeError(f"{path}: not an MCAP file, it begins with {begin!r}")
         checksum, unpacked = zlib.crc32(MAGIC), 0

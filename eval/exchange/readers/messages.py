@@ -10,6 +10,7 @@ from typing import Any, Final, Literal, TypeAlias, TypeVar
 
 import numpy as np
 
+from hippodrome._output import one_line
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignFrame, Motion, motion_of, motion_table, trajectory_of
@@ -105,7 +106,8 @@ def choose(path: Path, topics: Mapping[str, tuple[Kind, str]], wanted: Sequence[
     not_of = f" (not of {', '.join(cameras)[:200]})" if cameras else ""
     unused = f"; not used: {', '.join(rest)[:200]}" if rest else ""
     cure = "; --topic names others" if others else ""
-    print(f"{path}: images of {images[0]}{not_of}, self-motion of {motion or 'none'}, truth of {truth or 'none'}{unused}{cure}")
+    used = f"images of {images[0]}{not_of}, self-motion of {motion or 'none'}, truth of {truth or 'none'}{unused}{cure}"
+    print(f"{path}: {one_line(used)}")
     return Chosen(images[0], motion, truth)
 
 

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from hippodrome.core.types import FloatArray
 from hippodrome.eval.exchange.drives.clock import TimeUnit, in_seconds
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import Motion, motion_table
@@ -38,8 +39,13 @@ TIME_UNITS: Final[dict[str, TimeUnit]] = {
 }  # fmt: skip
 SPEED_UNITS: Final = {"ms": 1.0, "mps": 1.0, "m_s": 1.0, "kmh": 1 / 3.6, "km_h": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704,
                       "knots": 0.514444, "kn": 0.514444}  # fmt: skip
-YAW_UNITS: Final = {"rad": 1.0, "radps": 1.0, "rads": 1.0, "rad_s": 1.0, "deg": np.pi / 180, "degps": np.pi / 180,
-                    "degs": np.pi / 180, "deg_s": np.pi / 180, "dps": np.pi / 180, "°_s": np.pi / 180}  # fmt: skip
+RADIANS: Final = {"rad": 1.0, "rads": 1.0, "radian": 1.0, "radians": 1.0, "1": 1.0}
+DEGREES: Final = dict.fromkeys(("deg", "degs", "degree", "degrees", "°"), np.pi / 180)
+YAW_UNITS: Final = {
+    **{f"{angle}_{time}": size for angle, size in {**RADIANS, **DEGREES}.items() for time in ("s", "sec", "second")},
+    "rad": 1.0, "radps": 1.0, "rads": 1.0, "deg": np.pi / 180, "degps": np.pi / 180, "degs": np.pi / 180, "dps": np.pi / 180,
+}  # fmt: skip
+OWN_UNIT: Final = "map_units_s"  # of our own exports
 MAX_COLUMNS: Final = 1000  # of a hostile table
 
 
@@ -109,8 +115,48 @@ def read_motion(path: Path, unit: TimeUnit | None = None) -> Motion:
     if named == "s" and np.abs(table[:, 0]).min() > FARTHEST_S:
         named = None  # a header that was copied from somewhere: the size of the stamps tells better
     t_s = in_seconds(table[:, 0], unit or named, str(path))
-    speed = table[:, 1] * SPEED_UNITS.get(columns.speed.unit, 1.0)
-    return motion_table(t_s, speed, table[:, 2] * YAW_UNITS.get(columns.yaw_rate.unit, 1.0), str(path))
+    return motion_table(t_s, *in_units(path, columns, table), str(path))
+
+
+def in_units(path: Path, columns: MotionColumns, table: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Speeds (N,) and yaw rates (N,) of the second and third column of ``table``, by the units that the header names.
+
+    A speed may have any unit, as the refinement finds the metres; one that is not known is printed. Raises ExchangeError for an
+    unknown unit of the yaw rate.
+    """
+    speed, yaw_rate = columns.speed.unit, columns.yaw_rate.unit
+    if yaw_rate and yaw_rate not in YAW_UNITS:
+        raise ExchangeError(
+            f"{path}: column '{columns.yaw_rate.name}': its unit '{yaw_rate[:40]}' is not known; name rad/s or deg/s, or no unit "
+            "for rad/s"
+        )
+    if speed and speed not in (*SPEED_UNITS, OWN_UNIT):
+        print(f"{path}: column '{columns.speed.name}': its unit '{speed[:40]}' is not known; the numbers are taken as they are")
+    return table[:, 1] * SPEED_UNITS.get(speed, 1.0), table[:, 2] * YAW_UNITS.get(yaw_rate, 1.0)
+
+
+def columns_named(path: Path, lines: list[str], separator: str) -> MotionColumns | None:
+    """The columns of self-motion that a comment in the first line names; None where it names none of them elsewhere than first,
+    second and third. Raises ExchangeError where it names some of them elsewhere, and not all.
+    """
+    head = next((line for line in lines if line.strip()), "").strip()
+    if not head.startswith("#"):
+        return None
+    header = _header(head.lstrip("#"), separator)
+    if (found := _wanted(header)) is None:
+        _require_in_order(path, 1, header)
+    return found
+
+
+def _require_in_order(path: Path, line: int, header: list[Column]) -> None:
+    """Raise ExchangeError if a header names a column of self-motion where another one would be read without a header."""
+    places = [next((column.index for column in header if column.name in names), place)
+              for place, names in enumerate((TIMES, SPEEDS, YAW_RATES))]  # fmt: skip
+    if len(header) >= len(places) and places != sorted({*places}):
+        raise ExchangeError(
+            f"{path}: line {line}: the header names its columns {', '.join(one.name for one in header)[:80]}; name all three of "
+            "t_s, speed and yaw_rate, or leave the header out and give them in this order"
+        )
 
 
 def _separator(lines: list[str]) -> str | None:
@@ -134,6 +180,8 @@ def _columns(path: Path, lines: list[str], separator: str | None) -> tuple[int, 
                 )
             return number + 1, found
         if comment:
+            if len(header) == 3:
+                _require_in_order(path, number + 1, header)
             continue
         if _is_number(line.split(separator)[0].strip()):
             return number, PLAIN
@@ -153,10 +201,10 @@ def _header(line: str, separator: str | None) -> list[Column]:
 def _column(index: int, word: str) -> Column:
     """A column by its header, "speed [km/h]" or "speed_kmh": the name in lower case with underscores, and the unit."""
     name, bracket = word.strip().strip('"').strip(), ""
-    if found := re.match(r"^(.*?)\s*[\[(](.*?)[\])]\s*$", name):
+    if found := re.match(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$", name):
         name, bracket = found.group(1), found.group(2)
     plain = re.sub(r"[\s./\-]+", "_", name.strip().lower()).strip("_")
-    unit = re.sub(r"[\s./\-]+", "_", bracket.strip().lower()).strip("_").removesuffix("_1").rstrip("²")
+    unit = re.sub(r"[\s./^\-]+", "_", bracket.strip().lower()).strip("_").removesuffix("_1").rstrip("²")
     if not unit:
         for known in sorted({*TIME_UNITS, *SPEED_UNITS, *YAW_UNITS}, key=len, reverse=True):
             if plain.endswith(f"_{known}") and plain not in (*TIMES, *SPEEDS, *YAW_RATES):

@@ -18,6 +18,7 @@ from hippodrome.eval.exchange.drives.images import MAX_PIXELS, file_frame
 
 IMAGES: Final = (".jpg", ".jpeg", ".png")
 VIDEOS: Final = (".mp4", ".mov", ".avi", ".mkv", ".m4v", ".webm", ".mpg", ".mpeg", ".ts", ".3gp", ".mts", ".insv", ".360")
+UNSURE_FRAMES: Final = 3  # where a header has no count of frames, it is worked out from the length
 MAX_VIDEO_FRAMES: Final = 2_000_000  # 18 hours at 30 Hz
 
 
@@ -47,6 +48,10 @@ def read_video(path: Path, fps: float | None) -> ForeignDrive:
     """
     video = _Video(path)
     t_s = video.times_s()
+    if len(t_s) + UNSURE_FRAMES < (declared := video.declared_frames()):
+        print(
+            f"note: {path}: {len(t_s)} of the {declared} frames that its header names can be decoded: it was cut short or damaged"
+        )
     if fps is not None:
         t_s = np.arange(len(t_s)) / fps
     elif (np.diff(t_s) <= 0.0).any():
@@ -80,6 +85,11 @@ class _Video:
         if width * height > MAX_PIXELS or min(width, height) < 16:
             raise ExchangeError(f"{self._path}: {width:g} x {height:g} pixels; at least 16 a side, at most {MAX_PIXELS} in all")
         return capture
+
+    def declared_frames(self) -> int:
+        """How many frames the file's header names, or its length is worth; 0 where it does not say."""
+        count = float(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        return int(count) if 0.0 < count <= MAX_VIDEO_FRAMES else 0
 
     def rate_hz(self) -> float:
         """Frames a second by the file's header; 0 where it does not say."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import bz2
+import sqlite3
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final, cast
+from urllib.parse import quote
 
 import lz4.frame
 import rosbags.rosbag1.reader
@@ -18,7 +20,7 @@ import zstandard
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from hippodrome._files import read_bounded
+from hippodrome._files import open_regular, read_bounded
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignDrive
@@ -28,6 +30,7 @@ from hippodrome.eval.exchange.readers.mcap_records import (
     MAGIC,
     MAX_CHUNK_BYTES,
     MAX_GROWTH,
+    MAX_RECORD_BYTES,
     Reach,
     one_line,
     records,
@@ -53,6 +56,7 @@ KINDS: Final[dict[str, Kind]] = {
     "nav_msgs/msg/Odometry": "odometry",
     "geometry_msgs/msg/PoseStamped": "poses",
 }
+SQLITE_MAGIC: Final = b"SQLite format 3\0"
 ZSTD_MAGIC: Final = b"\x28\xb5\x2f\xfd"
 CURE: Final = (
     "copy it anew; `rosbag reindex` or `ros2 bag reindex` mend an index; of a ROS 2 bag the .mcap file itself can be imported"
@@ -67,6 +71,7 @@ def read_rosbag(path: Path, axes: Axes, topics: Sequence[str] = ()) -> ForeignDr
     try:
         _require_bounded(path)
         with _bounded_chunks(_most_bytes(path)), AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+            _require_small_chunks(path, bag)
             of_type = {one.topic: one.msgtype for one in bag.connections}
             chosen = choose(path, {topic: (KINDS.get(name, ""), name) for topic, name in of_type.items()}, topics)
             spool = Spool()
@@ -102,7 +107,10 @@ def _messages(path: Path, bag: AnyReader, topic: str, spool: Spool) -> list[Stam
 
 
 def _require_bounded(path: Path) -> None:
-    """Raise ExchangeError if a file of a ROS 2 bag is damaged, or unpacks to far more than it is."""
+    """Raise ExchangeError if a file of a bag is none, or, of a ROS 2 bag, is damaged or unpacks to far more than it is."""
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+        if not file.is_file() and not file.is_dir():  # the reader would wait for ever for what a named pipe will bring
+            raise ExchangeError(f"{file}: not a regular file, or not there; copy the bag anew")
     if path.is_dir() and (listed := path / "metadata.yaml").exists():
         read_values(listed, read_bounded(listed, MAX_BYTES).decode("utf-8"))  # its aliases make no more than a bag has
     for file in sorted(path.iterdir()) if path.is_dir() else ():
@@ -111,6 +119,8 @@ def _require_bounded(path: Path) -> None:
         if _begins_with(file, MAGIC):
             for _ in records(file, Reach()):
                 pass
+        elif _begins_with(file, SQLITE_MAGIC):
+            _require_small_rows(file)
         elif _begins_with(file, ZSTD_MAGIC):
             limit, count = _most_bytes(file), 0
             with (
@@ -123,8 +133,25 @@ def _require_bounded(path: Path) -> None:
                         raise ExchangeError(f"{file}: unpacked it is more than {limit} bytes; it is no log of a drive")
 
 
+def _require_small_rows(file: Path) -> None:
+    """Raise ExchangeError if a row of a bag's database holds more than a message may; it is measured, not read."""
+    with suppress(sqlite3.Error), closing(sqlite3.connect(f"file:{quote(str(file))}?immutable=1", uri=True)) as database:
+        if database.execute("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'messages'").fetchone() is None:
+            return  # the reader says what is missing; a view, whose rows would be computed, is refused by it as well
+        wrong = "SELECT rowid FROM messages WHERE typeof(data) <> 'blob' OR length(data) > ? LIMIT 1"
+        if (row := database.execute(wrong, (MAX_RECORD_BYTES,)).fetchone()) is not None:
+            raise ExchangeError(f"{file}: message {row[0]} is no message, or has more than {MAX_RECORD_BYTES} bytes; {CURE}")
+
+
+def _require_small_chunks(path: Path, bag: AnyReader) -> None:
+    """Raise ExchangeError if a chunk of a ROS 1 bag is larger than it may be, packed or not; none has been read by then."""
+    sizes = [chunk.datasize for reader in bag.readers for chunk in getattr(reader, "chunks", {}).values()]
+    if (largest := max(sizes, default=0)) > MAX_RECORD_BYTES:
+        raise ExchangeError(f"{path}: a chunk of {largest} bytes, the limit is {MAX_RECORD_BYTES}; record it with smaller chunks")
+
+
 def _begins_with(path: Path, magic: bytes) -> bool:
-    with path.open("rb") as stream:
+    with open_regular(path) as stream:
         return stream.read(len(magic)) == magic
 
 

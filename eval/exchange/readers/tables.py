@@ -21,7 +21,7 @@ from hippodrome.eval.exchange.drives.foreign import (
 from hippodrome.eval.exchange.drives.images import file_frame
 from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.drives.tables import ODOMETRY
-from hippodrome.eval.exchange.readers.motion_csv import read_motion
+from hippodrome.eval.exchange.readers.motion_csv import PLAIN, TIME_UNITS, columns_named, in_units, read_motion
 from hippodrome.eval.exchange.readers.pictures import image_files
 from hippodrome.eval.exchange.readers.text import inside, read_lines, read_table, read_values
 
@@ -62,13 +62,22 @@ def read_euroc_folder(folder: Path, axes: Axes) -> ForeignDrive:
     frames = _listed(root / "cam0" / "data.csv", ",", 1e-9, root / "cam0" / "data")
     motion, truth = None, None
     if (root / EUROC_ODOMETRY).exists():
-        table = read_table(root / EUROC_ODOMETRY, 3, ",")
-        motion = motion_table(table[:, 0] / 1e9, table[:, 1], table[:, 2], str(root / EUROC_ODOMETRY))
+        motion = _euroc_motion(root / EUROC_ODOMETRY)
     if (root / EUROC_TRUTH).exists():
         table = read_table(root / EUROC_TRUTH, 8, ",")
         quaternion = np.roll(table[:, 4:8], -1, axis=1)
         truth = trajectory_of(table[:, 0] / 1e9, table[:, 1:4], quaternion, axes, str(root / EUROC_TRUTH), True)
     return ForeignDrive(frames, motion, truth, _euroc_focal(root / "cam0" / "sensor.yaml"))
+
+
+def _euroc_motion(path: Path) -> Motion:
+    """Self-motion in EuRoC's way: nanoseconds, speed, yaw rate, in this order or in that of the first line's names."""
+    columns = columns_named(path, read_lines(path), ",") or PLAIN
+    places = [columns.time.index, columns.speed.index, columns.yaw_rate.index]
+    table = read_table(path, max(places) + 1, ",")[:, places]
+    unit = TIME_UNITS.get(columns.time.unit, "ns")
+    t_s = table[:, 0] / 1e9 if unit == "ns" else in_seconds(table[:, 0], unit, str(path))
+    return motion_table(t_s, *in_units(path, columns, table), str(path))
 
 
 def read_tum_poses(path: Path, axes: Axes) -> Trajectory:

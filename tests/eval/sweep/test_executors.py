@@ -17,19 +17,28 @@ def work(item):
         raise KeyError("x")
     if item == "killer":
         os.kill(os.getpid(), signal.SIGKILL)
+    if item == "hung up":
+        signal.raise_signal(signal.SIGHUP)
+    if item == "leaver":
+        raise SystemExit(3)
     return item.upper()
+
+
+WORK = ["a", "killer", "bad", "bug", "b", "hung up", "leaver"]
 
 
 def test_each_fails_alone():
     found = {}
     with Progress(disable=True) as progress:
-        Runner(local_processes(2), progress).run("work", work, ["a", "killer", "bad", "bug", "b"], found.__setitem__)
+        Runner(local_processes(2), progress).run("work", work, WORK, found.__setitem__)
     assert found == {
         "a": "A",
         "b": "B",
         "bad": Failure("bad.yaml: no road"),
         "bug": Failure("KeyError: 'x'"),
         "killer": Failure(DIED),
+        "hung up": Failure(DIED),  # the main process, which nobody hung up, goes on
+        "leaver": Failure("it left the process with status 3"),
     }
 
 

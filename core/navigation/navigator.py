@@ -257,8 +257,9 @@ class Navigator:
         assert self._belief.track is not None and self.estimate is not None
         drive = self._config.drive
         self._at_goal_s += dt_s
-        is_known = self._belief.track.along_sigma_m < drive.goal_sigma_m and self._belief.since_fix_m > drive.settled_m
-        if is_known and (self._guide is None or self._guide.vouches(self._belief.track.pose)):
+        track, sigma_m = self._belief.track, drive.goal_sigma_m
+        is_known = track.along_sigma_m < sigma_m and self._belief.since_fix_m > drive.settled_m
+        if is_known and (self._guide is None or self._guide.vouches(track, self._belief.witnesses, sigma_m)):
             self._arrived = True
             return self._standing(DrivingState.ARRIVED, "has arrived")
         if self._at_goal_s > ROUND_AGAIN_S:

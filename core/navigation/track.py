@@ -39,7 +39,7 @@ class Track:
 
     pose: FloatArray
     covariance: FloatArray
-    since_m: FloatArray  # (2,) way since the place along it was measured: what a wrong scale makes it wrong by is a share of it
+    since_m: FloatArray  # (2,) way since the place along it was measured, on which the scale is wrong by ``SCALE_SIGMA``
 
     @property
     def sigma_m(self) -> float:
@@ -59,8 +59,8 @@ def begun(pose: FloatArray, covariance: FloatArray) -> Track:
     return Track(np.array(pose, dtype=np.float64), np.array(covariance, dtype=np.float64), np.zeros(2))
 
 
-def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
-    """The track after a short arc."""
+def moved(track: Track, distance_m: float, turned_rad: float, scale_sigma: float = SCALE_SIGMA) -> Track:
+    """The track after a short arc, of whose length the logarithm has a standard deviation ``scale_sigma``."""
     chord = track.pose[2] + 0.5 * turned_rad
     step = distance_m * math.cos(chord), distance_m * math.sin(chord)
     pose = np.array([track.pose[0] + step[0], track.pose[1] + step[1], wrap_compiled(track.pose[2] + turned_rad)])
@@ -68,7 +68,7 @@ def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
     slope[0, 2], slope[1, 2] = -step[1], step[0]
     far = abs(distance_m)
     noise = _turned(pose[2], ALONG_PER_M * far, (SIDE_RAD * far) ** 2, HEADING_RAD_PER_SQRT_M**2 * far + (0.01 * turned_rad) ** 2)
-    return Track(pose, slope @ track.covariance @ slope.T + noise, track.since_m + np.array(step))
+    return Track(pose, slope @ track.covariance @ slope.T + noise, track.since_m + np.array(step) * (scale_sigma / SCALE_SIGMA))
 
 
 def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Track:
@@ -123,14 +123,20 @@ def with_lane(track: Track, reading: RoadReading, lane_point_m: FloatArray, lane
 
 def with_end(track: Track, reading: RoadReading, to_end_m: float, lane_heading_rad: float) -> tuple[Track, bool]:
     """The track after an end of the lane was seen ahead, and whether it fits; ``to_end_m`` is where the track expects it."""
-    if reading.end is LaneEnd.NOTHING or not math.isfinite(reading.end_variance_m2):
+    nearer_m = end_off_m(reading, to_end_m)
+    if math.isnan(nearer_m):
         return track, True
-    seen_m = reading.end_m + (STOP_LINE_BEFORE_END_M if reading.end is LaneEnd.STOP_LINE else 0.0)
-    nearer_m = to_end_m - seen_m  # the vehicle is so much farther along than believed
     if abs(nearer_m) > END_GATE_M:
         return track, False
     along = np.array([math.cos(lane_heading_rad), math.sin(lane_heading_rad), 0.0])
     return _measured(_with_scale(track), along, nearer_m, reading.end_variance_m2 + END_FLOOR_M[reading.end] ** 2)
+
+
+def end_off_m(reading: RoadReading, to_end_m: float) -> float:
+    """By how much the vehicle is farther along than believed, by an end of the lane that is seen; nan where none is."""
+    if reading.end is LaneEnd.NOTHING or not math.isfinite(reading.end_variance_m2):
+        return math.nan
+    return to_end_m - reading.end_m - (STOP_LINE_BEFORE_END_M if reading.end is LaneEnd.STOP_LINE else 0.0)
 
 
 def loosened(track: Track, heading_rad: float) -> Track:

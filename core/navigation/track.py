@@ -51,7 +51,12 @@ class Track:
     def along_sigma_m(self) -> float:
         """Standard deviation along the heading."""
         along = np.array([math.cos(self.pose[2]), math.sin(self.pose[2])])
-        return math.sqrt(max(float(along @ _with_scale(self).covariance[:2, :2] @ along), 0.0))
+        return math.sqrt(along_variance_m2(self, along))
+
+
+def along_variance_m2(track: Track, along: FloatArray) -> float:
+    """Variance of the position along a direction (2,), the scale's error included."""
+    return max(float(along @ _with_scale(track).covariance[:2, :2] @ along), 0.0)
 
 
 def begun(pose: FloatArray, covariance: FloatArray) -> Track:

@@ -95,7 +95,6 @@ class Belief:
         self._follow_localizer(estimate, distance_m, observation.dt_s, found, where)
         if self.track is not None and senses.footing.is_off_road:
             self.lose(estimate)
-        self._end_off_m = math.nan
         self._correct_by_lane(observation, estimate, senses, distance_m, where)
         told = self.recognised_pose(estimate)
         self.witnesses = heard(self.witnesses, self.track, distance_m, senses.drift_sigma, told, self._end_off_m)
@@ -141,7 +140,8 @@ class Belief:
         self._elsewhere_m = max(self._elsewhere_m - distance_m, 0.0)
         if self._since_found_m > FOUND_EVERY_M:
             self._since_found_m = 0.0
-            self.track = tracks.with_pose(tracks.humble(self.track), found.pose, FOUND_REPEATS * covariance)
+            noise = FOUND_REPEATS * self.witnesses.heeded(covariance, float(self.track.pose[2]))
+            self.track = tracks.with_pose(tracks.humble(self.track), found.pose, noise)
 
     def _follow_localizer(
         self, estimate: LocalizationEstimate, distance_m: float, dt_s: float, found: Place | None, where: Whereabouts | None
@@ -216,6 +216,7 @@ class Belief:
         where: Whereabouts | None,
     ) -> None:
         """Correct the pose by the lane, where the vehicle is on one that is no way through a junction."""
+        self._end_off_m = math.nan
         if self.track is None:
             return
         if self.plan is not None:

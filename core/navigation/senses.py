@@ -17,7 +17,7 @@ from hippodrome.core.reading.reader import RoadReader
 from hippodrome.core.reading.types import RoadReading
 from hippodrome.core.types import Observation
 
-SURE_SIGMA, OFF_SHARE = 0.03, 0.1  # a scale so sure is not wrong by more than this share: dashes that say so are miscounted
+SURE_SIGMA, OFF_SHARE, OFF_M = 0.03, 0.1, 0.1  # a scale so sure is not wrong by more than that: dashes that say so are miscounted
 COUNTED_SIGMA, UNCOUNTED_SIGMA, MOST_SIGMA = (
     0.002,
     0.015,
@@ -135,7 +135,7 @@ class Senses:
 
     def _told_by_dashes(self, metres: float, believed_m: float) -> float:
         """What was driven more than was believed by the scale, where that is sure enough to tell dashes that are miscounted."""
-        if self.scale_sigma > SURE_SIGMA or abs(metres - believed_m) > OFF_SHARE * believed_m:
+        if self.scale_sigma > SURE_SIGMA or abs(metres - believed_m) > OFF_SHARE * believed_m + OFF_M:
             return 0.0
         self._count(believed_m, 1.0)
         self._untold_m = 0.0

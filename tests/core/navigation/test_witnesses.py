@@ -54,3 +54,11 @@ def test_a_pose_is_not_better_along_the_way_than_what_was_measured_and_driven_si
     assert far.along_sigma_m(track, 2.0) == 2.0  # the hypotheses know it better
     assert far.reckoned_sigma_m(0.5 * math.pi) < 0.7  # what was driven across is read from the lanes
     assert Witnesses().along_sigma_m(track, 2.4) == 2.4
+
+
+def test_hypotheses_that_know_the_place_along_worse_than_dead_reckoning_tell_it_across_only():
+    wide, near = np.diag([2.0, 0.04, 1e-3]), np.diag([0.04, 0.04, 1e-3])
+    fresh = driven(20, (0.0, 0.0))
+    assert fresh.heeded(wide, 0.0)[0, 0] > 100.0 and fresh.heeded(wide, 0.0)[1, 1] == 0.04
+    assert np.array_equal(fresh.heeded(near, 0.0), near)
+    assert np.array_equal(Witnesses().heeded(wide, 0.0), wide)

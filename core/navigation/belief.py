@@ -140,8 +140,8 @@ class Belief:
         self._elsewhere_m = max(self._elsewhere_m - distance_m, 0.0)
         if self._since_found_m > FOUND_EVERY_M:
             self._since_found_m = 0.0
-            noise = FOUND_REPEATS * self.witnesses.heeded(covariance, float(self.track.pose[2]))
-            self.track = tracks.with_pose(tracks.humble(self.track), found.pose, noise)
+            across_only = self.witnesses.know_better(covariance, float(self.track.pose[2]))
+            self.track = tracks.with_found(self.track, found.pose, FOUND_REPEATS * covariance, across_only)
 
     def _follow_localizer(
         self, estimate: LocalizationEstimate, distance_m: float, dt_s: float, found: Place | None, where: Whereabouts | None

@@ -27,7 +27,7 @@ LOCALIZED_M, LOCALIZED_RAD = (
 LANE_FLOOR_M, LANE_FLOOR_RAD = 0.08, 0.02  # a lane read from a frame is not better than that
 END_FLOOR_M = {LaneEnd.STOP_LINE: 0.4, LaneEnd.MOUTH: 0.4}  # nor where a stop line or a mouth lies
 STOP_LINE_BEFORE_END_M = 0.9  # the near edge of a stop line, before the end of the lane
-HUMBLE_M = 0.25  # each metre that the place by the road network is heard
+HUMBLE_M, UNHEARD_M = 0.25, 30.0  # each metre that the place by the road network is heard; and where it is not
 LOOSE_M, LOOSE_RAD = 1.0, 0.1  # how wrong a pose may be that the lanes contradict
 GATE = 9.0  # squared standard deviations that a measurement of the lane may be off
 END_GATE_M = 4.0  # and metres that an end of the lane may be off: there is another junction beyond
@@ -91,9 +91,18 @@ def with_pose(track: Track, pose: FloatArray, noise: FloatArray) -> Track:
     return _shifted(track, gain @ difference, gain, np.eye(3), noise)
 
 
-def humble(track: Track) -> Track:
-    """The track before it hears of another estimate with errors of its own: less sure of itself than it has become."""
-    return replace(track, covariance=track.covariance + np.diag([HUMBLE_M**2, HUMBLE_M**2, 0.0]))
+def with_found(track: Track, pose: FloatArray, noise: FloatArray, across_only: bool = False) -> Track:
+    """The track after a place by the road network, which has errors of its own: it makes the track less sure than it was, too.
+
+    Args:
+        track: before.
+        pose: (3,) of the place.
+        noise: (3, 3) covariance of it.
+        across_only: along the way nothing is told.
+    """
+    heading, humble_m2 = float(pose[2]), HUMBLE_M**2
+    humble = replace(track, covariance=track.covariance + _turned(heading, 0.0 if across_only else humble_m2, humble_m2, 0.0))
+    return with_pose(humble, pose, noise + _turned(heading, UNHEARD_M**2 if across_only else 0.0, 0.0, 0.0))
 
 
 def sigmas_apart(track: Track, pose: FloatArray, covariance: FloatArray) -> float:

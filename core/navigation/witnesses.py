@@ -30,7 +30,7 @@ FITS, PER_FIT, GROUND_RANGE = 0.85, 25.0, (-3.0, 2.0)  # ground that fits so wel
 ENOUGH: Final = 1.5  # in all: 1 : 4.5 against another place, beside what the plan that led here says
 VIEW_M, END_M = 0.6, 0.4  # deviations along the way of a recognised view, and of an end of a lane
 WHITE_PER_M: Final = 0.004  # variance along the way that each metre of dead reckoning adds, beside the scale's share
-UNKNOWN_M2, UNHEARD_M = 1e4, 30.0
+UNKNOWN_M2: Final = 1e4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,16 +60,13 @@ class Witnesses:
         """The deviation along the way that an arrival may rely on; ``spread_m`` is that of the hypotheses."""
         return max(track.along_sigma_m, min(spread_m, self.reckoned_sigma_m(float(track.pose[2]))))
 
-    def heeded(self, covariance: FloatArray, heading_rad: float) -> FloatArray:
-        """The covariance (3, 3) of a place by hypotheses; along the way next to nothing where they know it worse than this.
+    def know_better(self, covariance: FloatArray, heading_rad: float) -> bool:
+        """Whether the place along the way is known better than by hypotheses with a covariance (3, 3).
 
         Between ends of lanes they are moved by the same metres, each with a scale of its own, which one wrong view can choose.
         """
-        along = np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
-        if float(along @ covariance @ along) < self.reckoned_sigma_m(heading_rad) ** 2:
-            return covariance
-        unheard: FloatArray = covariance + UNHEARD_M**2 * np.outer(along, along)
-        return unheard
+        along = np.array([math.cos(heading_rad), math.sin(heading_rad)])
+        return float(along @ covariance[:2, :2] @ along) > self.reckoned_sigma_m(heading_rad) ** 2
 
     def log_odds(self, share: float, fits: float) -> float:
         """Of this place against another one; with the share of the hypotheses that are here, and of the ground that fits."""

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hippodrome.core.navigation.track import begun
+from hippodrome.core.navigation.track import begun, with_found
 from hippodrome.core.navigation.witnesses import Witnesses, heard
 
 SURE = np.diag([0.01, 0.01, 1e-4])
@@ -59,6 +59,8 @@ def test_a_pose_is_not_better_along_the_way_than_what_was_measured_and_driven_si
 def test_hypotheses_that_know_the_place_along_worse_than_dead_reckoning_tell_it_across_only():
     wide, near = np.diag([2.0, 0.04, 1e-3]), np.diag([0.04, 0.04, 1e-3])
     fresh = driven(20, (0.0, 0.0))
-    assert fresh.heeded(wide, 0.0)[0, 0] > 100.0 and fresh.heeded(wide, 0.0)[1, 1] == 0.04
-    assert np.array_equal(fresh.heeded(near, 0.0), near)
-    assert np.array_equal(Witnesses().heeded(wide, 0.0), wide)
+    assert fresh.know_better(wide, 0.0) and not fresh.know_better(near, 0.0) and not Witnesses().know_better(wide, 0.0)
+    track, found = begun(np.zeros(3), np.diag([0.25, 0.25, 1e-3])), np.array([2.0, 1.0, 0.0])
+    told, across = with_found(track, found, wide), with_found(track, found, wide, across_only=True)
+    assert told.pose[0] > 0.2 and across.pose[0] < 0.01 and across.pose[1] == pytest.approx(told.pose[1]) and told.pose[1] > 0.8
+    assert across.along_sigma_m == pytest.approx(0.5, abs=0.001)

@@ -17,6 +17,7 @@ from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Indicator
 from hippodrome.core.navigation.whereabouts import Place, Whereabouts
+from hippodrome.core.navigation.witnesses import Witnesses, heard
 from hippodrome.core.reading.types import RoadReading
 from hippodrome.core.types import FloatArray, LocalizationEstimate, LocalizationStatus, Observation
 
@@ -65,6 +66,7 @@ class Belief:
         self._on_map_m = self._oncoming_m = self._since_read_m = 0.0
         self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
         self._refuted_m = 0.0
+        self.witnesses, self._end_off_m = Witnesses(), math.nan  # and how far off an end of the lane is seen
 
     def step(
         self,
@@ -85,7 +87,7 @@ class Belief:
             found: the place by the road network, where it is sure.
             where: the hypotheses of it.
         """
-        self._move(distance_m, observation.yaw_rate_radps * observation.dt_s)
+        self._move(distance_m, observation.yaw_rate_radps * observation.dt_s, senses.drift_sigma)
         if self._config.exact_poses:
             self._take_over(estimate)
             return
@@ -94,6 +96,8 @@ class Belief:
         if self.track is not None and senses.footing.is_off_road:
             self.lose(estimate)
         self._correct_by_lane(observation, estimate, senses, distance_m, where)
+        told = self.recognised_pose(estimate)
+        self.witnesses = heard(self.witnesses, self.track, distance_m, senses.drift_sigma, told, self._end_off_m)
 
     def lose(self, estimate: LocalizationEstimate) -> None:
         """Give the pose up, and do not take it from the localizer again: what is seen contradicts it."""
@@ -106,9 +110,9 @@ class Belief:
         is_recognised = estimate.confidence >= self._config.localizer.margin
         return estimate.pose if is_recognised and estimate.status is LocalizationStatus.LOCALIZED else None
 
-    def _move(self, distance_m: float, turned_rad: float) -> None:
+    def _move(self, distance_m: float, turned_rad: float, scale_sigma: float) -> None:
         if self.track is not None:
-            self.track = tracks.moved(self.track, distance_m, turned_rad)
+            self.track = tracks.moved(self.track, distance_m, turned_rad, scale_sigma)
         if self._refuted is not None:
             self._refuted = tracks.moved(self._refuted, distance_m, turned_rad)
         self.since_fix_m += abs(distance_m)
@@ -136,7 +140,8 @@ class Belief:
         self._elsewhere_m = max(self._elsewhere_m - distance_m, 0.0)
         if self._since_found_m > FOUND_EVERY_M:
             self._since_found_m = 0.0
-            self.track = tracks.with_pose(tracks.humble(self.track), found.pose, FOUND_REPEATS * covariance)
+            across_only = self.witnesses.know_better(covariance, float(self.track.pose[2]))
+            self.track = tracks.with_found(self.track, found.pose, FOUND_REPEATS * covariance, across_only)
 
     def _follow_localizer(
         self, estimate: LocalizationEstimate, distance_m: float, dt_s: float, found: Place | None, where: Whereabouts | None
@@ -199,6 +204,7 @@ class Belief:
     def _restart(self, pose: FloatArray, covariance: FloatArray) -> None:
         self.track, self.plan = tracks.begun(pose, covariance), None
         self.since_fix_m = self._elsewhere_m = 0.0
+        self.witnesses = Witnesses()
         self._apart_looks = self._vouched = 0
 
     def _correct_by_lane(
@@ -210,6 +216,7 @@ class Belief:
         where: Whereabouts | None,
     ) -> None:
         """Correct the pose by the lane, where the vehicle is on one that is no way through a junction."""
+        self._end_off_m = math.nan
         if self.track is None:
             return
         if self.plan is not None:
@@ -239,6 +246,7 @@ class Belief:
         if not len(network.successors(place.lane)) or network.is_internal[network.successors(place.lane)].any():
             to_end_m = float(self._planner.roads.lane_length_m[place.lane]) - place.position_m
             self.track, _ = tracks.with_end(self.track, reading, to_end_m, read.heading_rad)
+            self._end_off_m = tracks.end_off_m(reading, to_end_m)
 
     def _is_on_oncoming(self, place: LanePlace, read: LanePlace, reading: RoadReading, since_m: float) -> bool:
         """Whether the borders of the lane that is read have been those of the oncoming lane for long."""

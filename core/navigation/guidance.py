@@ -26,9 +26,11 @@ from hippodrome.core.navigation.placing import lane_of
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2, stopping_mps
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
+from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Command, DrivingState, Radar
 from hippodrome.core.navigation.ways import drawn_on, moved, strip, way_poses, ways_ahead
 from hippodrome.core.navigation.whereabouts import Place, Whereabouts
+from hippodrome.core.navigation.witnesses import Witnesses
 from hippodrome.core.reading.types import LaneEnd, RoadReading
 from hippodrome.core.roads.paths import Piece
 from hippodrome.core.se2 import wrap
@@ -52,8 +54,7 @@ NEAR_GOAL_M: Final = 25.0  # whoever is not sure of the place does not stop at t
 AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of the way, which must not lead off the road
 OFF_ROAD, OFF_ROAD_LOOKS = 0.15, 2
 FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 12.0  # a place so sure, for so long, is a fix
-VOUCHED: Final = 0.7  # share of the hypotheses that must be at the goal for an arrival to be said
-GUIDED_MPS: Final = 6.0
+SAME_PLACE_M, GUIDED_MPS = 12.0, 6.0  # hypotheses so near to the goal are no other place: how far along they are is asked apart
 REASON, GUESS = "drives where all likely places have a lane", "creeps where most likely places have a lane"
 
 
@@ -85,9 +86,10 @@ class Guide:
         """The place, where it is sure."""
         return self.place if self._sure_m >= FIX_M else None
 
-    def vouches(self, pose: FloatArray) -> bool:
-        """Whether the hypotheses have the vehicle at a pose, too, and the ground there is as the network has it."""
-        return self.whereabouts.fits > FIX_FITS and self.whereabouts.near(pose).share > VOUCHED
+    def vouches(self, track: Track, witnesses: Witnesses, goal_sigma_m: float) -> bool:
+        """Whether the vehicle is at the place that it is taken to be at, and known so well along the way."""
+        share, spread_m = self.whereabouts.about(track.pose, SAME_PLACE_M)
+        return witnesses.vouch(share, self.whereabouts.fits) and witnesses.along_sigma_m(track, spread_m) < goal_sigma_m
 
     @property
     def way_to_goal(self) -> tuple[Plan | None, FloatArray | None]:
@@ -260,8 +262,7 @@ class Guide:
         far_m = self._reach_m(self._field.agreed(ahead[None], poses)[0])
         if far_m[0] < LEAST_M or self._leads_off_road(senses, ahead):
             return False
-        self.plan, self.pose, self._to_goal = plan, best.pose, True
-        self.agreed_m, self.guessed_m = far_m
+        self.plan, self.pose, self._to_goal, (self.agreed_m, self.guessed_m) = plan, best.pose, True, far_m
         return True
 
     def _drive(self, pose: FloatArray, pieces: Sequence[Piece], position_m: float, far_m: tuple[float, float]) -> None:

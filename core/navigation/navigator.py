@@ -31,10 +31,12 @@ from hippodrome.core.navigation.searching import search_step
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
+from hippodrome.core.navigation.streets import StreetMemory
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Command, DrivingState, Goal, Indicator, Radar
 from hippodrome.core.navigation.watch import SensorHealth, is_dark, watched
 from hippodrome.core.navigation.whereabouts import Place
+from hippodrome.core.navigation.witnesses import measured
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, LocalizationEstimate, LocalizationStatus, Observation
 
@@ -89,6 +91,7 @@ class Navigator:
         self._escape = Escape(config, self._senses, self._belief, self._planner, self._side)
         self._guide = Guide(config, self._planner) if config.search_network and poses is None else None
         self._blockage = Blockage(config, self._senses, self._belief, self._planner, self._escape, self._guide)
+        self._streets = None if config.exact_poses else StreetMemory(config.localizer.views)
         self._health = SensorHealth()
         self._has_goal = False
         self._at_goal_s = self._search_stood_s = self._searched_m = 0.0
@@ -126,11 +129,26 @@ class Navigator:
         found = self._guess(observation, distance_m)
         where = None if self._guide is None else self._guide.whereabouts
         self._belief.step(observation, self.estimate, distance_m, senses, found, where)
+        self._know_street(observation, distance_m)
         self._escape.moved(distance_m, observation.yaw_rate_radps * dt_s)
         command = self._decide(radar, dt_s)
         accel, wheel, reverse = command.acceleration_mps2, command.steering_rad, command.reverse
         senses.motion = motions.commanded(senses.motion, accel, wheel, dt_s, reverse)
         return command
+
+    def _know_street(self, observation: Observation, distance_m: float) -> None:
+        """Learn the street that is driven, or recognise it, where the map has no views of it."""
+        belief, place = self._belief, None
+        if self._streets is None:
+            return
+        if belief.track is not None and distance_m > 0.0 and not belief.turns_round:
+            place = self._planner.lane_place(belief.plan, belief.track.pose)
+            place = None if place is None or self._planner.roads.network.is_internal[place.lane] else place
+        turned_rad = observation.yaw_rate_radps * observation.dt_s
+        drift = self._senses.drift_sigma
+        belief.track, sigma_m = self._streets.step(belief.track, place, observation.frame, distance_m, turned_rad, drift)
+        if belief.track is not None and not math.isnan(sigma_m):
+            belief.witnesses = measured(belief.witnesses, sigma_m, float(belief.track.pose[2]))
 
     def _guessed_scale(self) -> float | None:
         """Metres per unit of the odometry by the hypotheses, where they are sure of the place."""
@@ -257,8 +275,9 @@ class Navigator:
         assert self._belief.track is not None and self.estimate is not None
         drive = self._config.drive
         self._at_goal_s += dt_s
-        is_known = self._belief.track.along_sigma_m < drive.goal_sigma_m and self._belief.since_fix_m > drive.settled_m
-        if is_known and (self._guide is None or self._guide.vouches(self._belief.track.pose)):
+        track, sigma_m = self._belief.track, drive.goal_sigma_m
+        is_known = track.along_sigma_m < sigma_m and self._belief.since_fix_m > drive.settled_m
+        if is_known and (self._guide is None or self._guide.vouches(track, self._belief.witnesses, sigma_m)):
             self._arrived = True
             return self._standing(DrivingState.ARRIVED, "has arrived")
         if self._at_goal_s > ROUND_AGAIN_S:

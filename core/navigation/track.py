@@ -27,7 +27,7 @@ LOCALIZED_M, LOCALIZED_RAD = (
 LANE_FLOOR_M, LANE_FLOOR_RAD = 0.08, 0.02  # a lane read from a frame is not better than that
 END_FLOOR_M = {LaneEnd.STOP_LINE: 0.4, LaneEnd.MOUTH: 0.4}  # nor where a stop line or a mouth lies
 STOP_LINE_BEFORE_END_M = 0.9  # the near edge of a stop line, before the end of the lane
-HUMBLE_M = 0.25  # each metre that the place by the road network is heard
+HUMBLE_M, UNHEARD_M = 0.25, 30.0  # each metre that the place by the road network is heard; and where it is not
 LOOSE_M, LOOSE_RAD = 1.0, 0.1  # how wrong a pose may be that the lanes contradict
 GATE = 9.0  # squared standard deviations that a measurement of the lane may be off
 END_GATE_M = 4.0  # and metres that an end of the lane may be off: there is another junction beyond
@@ -39,7 +39,7 @@ class Track:
 
     pose: FloatArray
     covariance: FloatArray
-    since_m: FloatArray  # (2,) way since the place along it was measured: what a wrong scale makes it wrong by is a share of it
+    since_m: FloatArray  # (2,) way since the place along it was measured, on which the scale is wrong by ``SCALE_SIGMA``
 
     @property
     def sigma_m(self) -> float:
@@ -51,7 +51,12 @@ class Track:
     def along_sigma_m(self) -> float:
         """Standard deviation along the heading."""
         along = np.array([math.cos(self.pose[2]), math.sin(self.pose[2])])
-        return math.sqrt(max(float(along @ _with_scale(self).covariance[:2, :2] @ along), 0.0))
+        return math.sqrt(along_variance_m2(self, along))
+
+
+def along_variance_m2(track: Track, along: FloatArray) -> float:
+    """Variance of the position along a direction (2,), the scale's error included."""
+    return max(float(along @ _with_scale(track).covariance[:2, :2] @ along), 0.0)
 
 
 def begun(pose: FloatArray, covariance: FloatArray) -> Track:
@@ -59,8 +64,8 @@ def begun(pose: FloatArray, covariance: FloatArray) -> Track:
     return Track(np.array(pose, dtype=np.float64), np.array(covariance, dtype=np.float64), np.zeros(2))
 
 
-def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
-    """The track after a short arc."""
+def moved(track: Track, distance_m: float, turned_rad: float, scale_sigma: float = SCALE_SIGMA) -> Track:
+    """The track after a short arc, of whose length the logarithm has a standard deviation ``scale_sigma``."""
     chord = track.pose[2] + 0.5 * turned_rad
     step = distance_m * math.cos(chord), distance_m * math.sin(chord)
     pose = np.array([track.pose[0] + step[0], track.pose[1] + step[1], wrap_compiled(track.pose[2] + turned_rad)])
@@ -68,7 +73,7 @@ def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
     slope[0, 2], slope[1, 2] = -step[1], step[0]
     far = abs(distance_m)
     noise = _turned(pose[2], ALONG_PER_M * far, (SIDE_RAD * far) ** 2, HEADING_RAD_PER_SQRT_M**2 * far + (0.01 * turned_rad) ** 2)
-    return Track(pose, slope @ track.covariance @ slope.T + noise, track.since_m + np.array(step))
+    return Track(pose, slope @ track.covariance @ slope.T + noise, track.since_m + np.array(step) * (scale_sigma / SCALE_SIGMA))
 
 
 def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Track:
@@ -86,9 +91,18 @@ def with_pose(track: Track, pose: FloatArray, noise: FloatArray) -> Track:
     return _shifted(track, gain @ difference, gain, np.eye(3), noise)
 
 
-def humble(track: Track) -> Track:
-    """The track before it hears of another estimate with errors of its own: less sure of itself than it has become."""
-    return replace(track, covariance=track.covariance + np.diag([HUMBLE_M**2, HUMBLE_M**2, 0.0]))
+def with_found(track: Track, pose: FloatArray, noise: FloatArray, across_only: bool = False) -> Track:
+    """The track after a place by the road network, which has errors of its own: it makes the track less sure than it was, too.
+
+    Args:
+        track: before.
+        pose: (3,) of the place.
+        noise: (3, 3) covariance of it.
+        across_only: along the way nothing is told.
+    """
+    heading, humble_m2 = float(pose[2]), HUMBLE_M**2
+    humble = replace(track, covariance=track.covariance + _turned(heading, 0.0 if across_only else humble_m2, humble_m2, 0.0))
+    return with_pose(humble, pose, noise + _turned(heading, UNHEARD_M**2 if across_only else 0.0, 0.0, 0.0))
 
 
 def sigmas_apart(track: Track, pose: FloatArray, covariance: FloatArray) -> float:
@@ -123,14 +137,20 @@ def with_lane(track: Track, reading: RoadReading, lane_point_m: FloatArray, lane
 
 def with_end(track: Track, reading: RoadReading, to_end_m: float, lane_heading_rad: float) -> tuple[Track, bool]:
     """The track after an end of the lane was seen ahead, and whether it fits; ``to_end_m`` is where the track expects it."""
-    if reading.end is LaneEnd.NOTHING or not math.isfinite(reading.end_variance_m2):
+    nearer_m = end_off_m(reading, to_end_m)
+    if math.isnan(nearer_m):
         return track, True
-    seen_m = reading.end_m + (STOP_LINE_BEFORE_END_M if reading.end is LaneEnd.STOP_LINE else 0.0)
-    nearer_m = to_end_m - seen_m  # the vehicle is so much farther along than believed
     if abs(nearer_m) > END_GATE_M:
         return track, False
     along = np.array([math.cos(lane_heading_rad), math.sin(lane_heading_rad), 0.0])
     return _measured(_with_scale(track), along, nearer_m, reading.end_variance_m2 + END_FLOOR_M[reading.end] ** 2)
+
+
+def end_off_m(reading: RoadReading, to_end_m: float) -> float:
+    """By how much the vehicle is farther along than believed, by an end of the lane that is seen; nan where none is."""
+    if reading.end is LaneEnd.NOTHING or not math.isfinite(reading.end_variance_m2):
+        return math.nan
+    return to_end_m - reading.end_m - (STOP_LINE_BEFORE_END_M if reading.end is LaneEnd.STOP_LINE else 0.0)
 
 
 def loosened(track: Track, heading_rad: float) -> Track:

@@ -269,6 +269,16 @@ class Whereabouts:
         centre = np.array([*(share[mine] @ rows[mine, :2] / share[mine].sum()), mean_rad(rows[mine, hyp.HEADING], share[mine])])
         return self.near(centre, share)
 
+    def about(self, pose: FloatArray, reach_m: float) -> tuple[float, float]:
+        """Share of the weight within ``reach_m`` of a pose, and its standard deviation along the pose's heading (m)."""
+        share, apart = self._shares(), self._rows[: self._count, :2] - pose[:2]
+        turned = np.abs(wrap(self._rows[: self._count, hyp.HEADING] - pose[2]))
+        mine = share * ((np.hypot(*apart.T) < reach_m) & (turned < CLUSTER_RAD))
+        if (total := float(mine.sum())) <= 0.0:
+            return 0.0, math.inf
+        along = apart @ np.array([math.cos(pose[2]), math.sin(pose[2])])
+        return total, math.sqrt(max(float(mine @ along**2) / total - (float(mine @ along) / total) ** 2, 0.0))
+
     def near(self, pose: FloatArray, share: FloatArray | None = None) -> Place:
         """The place of all the particles about a pose."""
         share, rows = self._shares() if share is None else share, self._rows[: self._count]

@@ -33,20 +33,21 @@ def method_sha256(spec: MethodSpec) -> str:
 def _module_file(reference: str) -> Path | None:
     """The file of a module; none of the packages that it lies in is imported for it, as that would run them."""
     search_here()
-    name, places, found = "", None, None
+    name, places, file = "", None, None
     for part in reference.partition(":")[0].split("."):
         name = f"{name}.{part}" if name else part
-        found = _spec_of(name, places)
-        if found is None:
-            return None
-        places = found.submodule_search_locations
-    return Path(found.origin) if found is not None and found.origin is not None else None
+        if (found := _spec_of(name, places)) is not None:
+            file, inside = found.origin, found.submodule_search_locations
+        else:  # a folder alone is a package, too
+            file, inside = None, [path for place in places or sys.path if Path(path := str(Path(place, part))).is_dir()]
+        places = list(inside or ())
+    return None if file is None else Path(file)
 
 
 def _spec_of(name: str, places: Sequence[str] | None) -> ModuleSpec | None:
     """Where a module lies, by the first finder that knows it."""
     for finder in sys.meta_path:
-        with suppress(ImportError, ValueError, AttributeError):  # an old finder has no such function
+        with suppress(ImportError, ValueError, AttributeError, KeyError):  # an old finder; a folder in one not yet imported
             if (found := finder.find_spec(name, places)) is not None:
                 return found
     return None

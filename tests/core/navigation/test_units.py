@@ -7,9 +7,11 @@ import pytest
 
 from hippodrome.core.navigation import motion as motions
 from hippodrome.core.navigation import track as tracks
-from hippodrome.core.navigation.config import DriveConfig, VehicleShape, WatchConfig
+from hippodrome.core.navigation.config import DriveConfig, NavigatorConfig, VehicleShape, WatchConfig
 from hippodrome.core.navigation.dashes import driven_m, line_levels
 from hippodrome.core.navigation.junctions import gate_speed_mps
+from hippodrome.core.navigation.searching import LaneMemory
+from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import can_stop, following_mps2, stop_mps2, stopping_mps
 from hippodrome.core.navigation.steering import lane_curvature_1pm, steering_rad
 from hippodrome.core.navigation.types import Lamp, Radar
@@ -92,6 +94,33 @@ def dashed_road(driven):
 def test_passing_dashes_tell_the_metres(step_m):
     before, after = (line_levels(dashed_road(at), CAMERA, 0.0, 0.0, 0.0, 1.0) for at in (4.0, 4.0 + step_m))
     assert driven_m(before, after, 0.6 * step_m) == pytest.approx(step_m, abs=0.15)
+
+
+def metres_by(frames, metres=60.0, step_m=0.8):
+    """The metres that are counted where the localizer's scale is 4 % too large, and how wrong they may be for each metre."""
+    senses, counted = Senses(NavigatorConfig(), -1.0, 2.0), 0.0
+    senses.memory = LaneMemory(since_m=0.0)
+    senses.motion = motions.Motion(told=math.log(2.0 * 1.04), told_m=100.0)
+    for k in range(round(metres / step_m)):
+        observation = Observation(0.1 * k, 0.1, 10.0 * step_m / 2.0, 0.0, frames(step_m * k))
+        moved_m = senses.metres_per_unit * step_m / 2.0
+        senses.motion = motions.sensed(senses.motion, observation, senses.metres_per_unit, VEHICLE)
+        counted += moved_m + senses._see_dashes(observation, moved_m)
+    return counted, senses.drift_sigma
+
+
+def test_metres_are_those_of_the_dashes_where_there_are_some():
+    counted, drift = metres_by(dashed_road)
+    blind, more_drift = metres_by(lambda driven: np.full((120, 160, 3), 100, dtype=np.uint8))
+    assert counted == pytest.approx(60.0, abs=1.3)  # until some have passed the scale tells, and the painter's dashes are coarse
+    assert blind == pytest.approx(62.4, abs=0.3)
+    assert drift < 0.7 * more_drift
+
+
+def test_what_was_told_long_ago_tells_less_of_the_scale():
+    told = motions.Motion(told=math.log(2.0), told_m=100.0)
+    later = motions.sensed(told, Observation(0.1, 0.1, 3000.0, 0.0), 2.0, VEHICLE)
+    assert later.scale_sigma(1.6) > 1.5 * told.scale_sigma(1.6)
 
 
 def test_plain_asphalt_tells_nothing():

@@ -13,9 +13,11 @@ from hippodrome.core.navigation.guidance import GUESS, LOOK_M, REASON, Guide
 from hippodrome.core.navigation.paving import paving
 from hippodrome.core.navigation.pilot import RoutePlanner
 from hippodrome.core.navigation.searching import LaneMemory
+from hippodrome.core.navigation.track import begun
 from hippodrome.core.navigation.types import Radar
 from hippodrome.core.navigation.ways import way_poses, ways_ahead
 from hippodrome.core.navigation.whereabouts import Whereabouts
+from hippodrome.core.navigation.witnesses import Witnesses
 from hippodrome.core.reading.types import LaneEnd, RoadReading
 from hippodrome.core.roads.geometry import road_geometry
 from tests.core.navigation.roads import arc, map_along, network_of
@@ -127,9 +129,12 @@ def test_what_tells_them_apart_gives_a_fix_at_the_right_place():
     guide, eyes = guide_on(network), Eyes(network)
     truth = drive(lambda d, t, eyes: guide.step(d, t, eyes, None, True), eyes, (20.0, 0.0, 0.0), [*LEFT[:2], (10.0, 0.0)])
     assert guide.fix is not None and np.hypot(*(guide.fix.pose - truth)[:2]) < 1.5
-    assert guide.vouches(truth) and not guide.vouches(truth + np.array([0.0, 300.0, 0.0]))
+    here, there = (begun(truth + np.array([0.0, y, 0.0]), np.diag([0.04, 0.04, 1e-4])) for y in (0.0, 300.0))
+    assert guide.vouches(here, Witnesses(), 1.5) and not guide.vouches(there, Witnesses(), 1.5)
     guide.whereabouts.fits = 0.8
-    assert not guide.vouches(truth)
+    assert not guide.vouches(here, Witnesses(), 1.5)  # the ground is not as the network has it ..
+    assert guide.vouches(here, Witnesses(views=4.0), 1.5)  # .. but in fog that is so, and views have been recognised
+    assert not guide.vouches(here, Witnesses(views=4.0), 0.1)  # known well enough it must be all the same
 
 
 def test_a_recognised_view_decides_between_roads_that_are_alike():

@@ -11,6 +11,8 @@ from hippodrome.core import se2
 from hippodrome.core.navigation import track as tracks
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.course import at, offset_and_turn, path_poses
+from hippodrome.core.navigation.ground_fit import GroundFit
+from hippodrome.core.navigation.paving import paving
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced
 from hippodrome.core.navigation.placing import LanePlace, lane_that_is_read, oncoming_place, speaks_for_oncoming
 from hippodrome.core.navigation.senses import Senses
@@ -65,6 +67,8 @@ class Belief:
         self._on_map_m = self._oncoming_m = self._since_read_m = 0.0
         self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
         self._refuted_m = 0.0
+        self._scale_sigma = tracks.SCALE_SIGMA
+        self._ground = GroundFit(paving(planner.roads.network))
 
     def step(
         self,
@@ -85,6 +89,7 @@ class Belief:
             found: the place by the road network, where it is sure.
             where: the hypotheses of it.
         """
+        self._scale_sigma = senses.scale_sigma
         self._move(distance_m, observation.yaw_rate_radps * observation.dt_s)
         if self._config.exact_poses:
             self._take_over(estimate)
@@ -108,7 +113,7 @@ class Belief:
 
     def _move(self, distance_m: float, turned_rad: float) -> None:
         if self.track is not None:
-            self.track = tracks.moved(self.track, distance_m, turned_rad)
+            self.track = tracks.moved(self.track, distance_m, turned_rad, self._scale_sigma)
         if self._refuted is not None:
             self._refuted = tracks.moved(self._refuted, distance_m, turned_rad)
         self.since_fix_m += abs(distance_m)
@@ -197,7 +202,7 @@ class Belief:
         return self._refuted is not None
 
     def _restart(self, pose: FloatArray, covariance: FloatArray) -> None:
-        self.track, self.plan = tracks.begun(pose, covariance), None
+        self.track, self.plan = tracks.begun(pose, covariance, self._scale_sigma), None
         self.since_fix_m = self._elsewhere_m = 0.0
         self._apart_looks = self._vouched = 0
 
@@ -218,6 +223,7 @@ class Belief:
         self._since_read_m += distance_m
         if observation.frame is None or observation.speed <= 0.0 or self.turns_round:
             return
+        self.track = self._ground.step(self.track, senses.ground, self._since_read_m)
         self._check_by_sight(estimate, senses)
         since_read_m, self._since_read_m = min(self._since_read_m, READ_APART_M), 0.0
         if reading is None or self.track is None:

@@ -1,8 +1,10 @@
 """The pose that is steered by: the localizer's pose, corrected by the lane and by what is seen across it.
 
-An extended Kalman filter on (x, y, heading) in the network frame. The localizer's pose is a measurement of little weight, since
-its error changes slowly: what it says again and again is the same error. The lane read from a frame corrects the pose across the
-lane and its heading, a stop line or a junction's mouth corrects it along the lane.
+An extended Kalman filter on (x, y, heading, ln of the scale's error) in the network frame. The localizer's pose is a measurement of
+little weight, since its error changes slowly: what it says again and again is the same error. The lane read from a frame corrects
+the pose across the lane and its heading, a stop line or a junction's mouth corrects it along the lane, and so does the ground
+about the vehicle (``ground_fit``). A scale that is wrong makes all metres since the last such correction wrong by the same share,
+and each correction along the way tells of it: so it belongs to the state (a first-order Gauss-Markov process).
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
 ALONG_PER_M = 0.005  # variance along the way that each metre adds
-SCALE_SIGMA = 0.015  # and the share of the way that it is wrong by: passing dashes tell the scale so well
+SCALE_SIGMA = 0.025  # and the share of the way that it is wrong by, however well dashes and views tell the scale: as measured
+SCALE_MEMORY_M = 100.0  # over which that share forgets itself, as dashes and views tell the scale anew
 HEADING_RAD_PER_SQRT_M = 0.003  # random walk of the heading
 SIDE_RAD = 0.005  # drift across per metre
 LOCALIZED_M, LOCALIZED_RAD = (
@@ -35,40 +38,56 @@ END_GATE_M = 4.0  # and metres that an end of the lane may be off: there is anot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """A pose (3,) in the network frame and its covariance (3, 3)."""
+    """A pose (3,) in the network frame, the scale's error, and the covariance (4, 4) of x, y, heading and that error.
+
+    ``log_scale`` is ln of the metres that were driven in each metre that was told.
+    """
 
     pose: FloatArray
     covariance: FloatArray
-    since_m: FloatArray  # (2,) way since the place along it was measured: what a wrong scale makes it wrong by is a share of it
+    log_scale: float = 0.0
 
     @property
     def sigma_m(self) -> float:
-        """Standard deviation of the position, as the root mean square over both axes, the scale's error included."""
-        whole = _with_scale(self).covariance
-        return math.sqrt(max(0.5 * float(whole[0, 0] + whole[1, 1]), 0.0))
+        """Standard deviation of the position, as the root mean square over both axes."""
+        return math.sqrt(max(0.5 * float(self.covariance[0, 0] + self.covariance[1, 1]), 0.0))
 
     @property
     def along_sigma_m(self) -> float:
         """Standard deviation along the heading."""
         along = np.array([math.cos(self.pose[2]), math.sin(self.pose[2])])
-        return math.sqrt(max(float(along @ _with_scale(self).covariance[:2, :2] @ along), 0.0))
+        return math.sqrt(max(float(along @ self.covariance[:2, :2] @ along), 0.0))
+
+    def worst_axis(self) -> tuple[FloatArray, float]:
+        """The axis (2,) on which the position is known worst, ahead rather than behind, and the standard deviation on it."""
+        values, vectors = np.linalg.eigh(self.covariance[:2, :2])
+        axis: FloatArray = vectors[:, 1]
+        ahead = axis @ (math.cos(self.pose[2]), math.sin(self.pose[2]))
+        return axis if ahead >= 0.0 else -axis, math.sqrt(max(float(values[1]), 0.0))
 
 
-def begun(pose: FloatArray, covariance: FloatArray) -> Track:
-    """A track that begins at the localizer's pose."""
-    return Track(np.array(pose, dtype=np.float64), np.array(covariance, dtype=np.float64), np.zeros(2))
+def begun(pose: FloatArray, covariance: FloatArray, scale_sigma: float = SCALE_SIGMA) -> Track:
+    """A track that begins at the localizer's pose, with a covariance (3, 3), and a scale that is wrong by some share."""
+    whole = np.zeros((4, 4))
+    whole[:3, :3], whole[3, 3] = covariance, max(scale_sigma, SCALE_SIGMA) ** 2
+    return Track(np.array(pose, dtype=np.float64), whole)
 
 
-def moved(track: Track, distance_m: float, turned_rad: float) -> Track:
-    """The track after a short arc."""
-    chord = track.pose[2] + 0.5 * turned_rad
+def moved(track: Track, distance_m: float, turned_rad: float, scale_sigma: float = SCALE_SIGMA) -> Track:
+    """The track after a short arc, of which the length is told with a standard deviation of its logarithm."""
+    chord, distance_m = track.pose[2] + 0.5 * turned_rad, distance_m * math.exp(track.log_scale)
     step = distance_m * math.cos(chord), distance_m * math.sin(chord)
     pose = np.array([track.pose[0] + step[0], track.pose[1] + step[1], wrap_compiled(track.pose[2] + turned_rad)])
-    slope = np.eye(3)
-    slope[0, 2], slope[1, 2] = -step[1], step[0]
     far = abs(distance_m)
-    noise = _turned(pose[2], ALONG_PER_M * far, (SIDE_RAD * far) ** 2, HEADING_RAD_PER_SQRT_M**2 * far + (0.01 * turned_rad) ** 2)
-    return Track(pose, slope @ track.covariance @ slope.T + noise, track.since_m + np.array(step))
+    kept = math.exp(-far / SCALE_MEMORY_M)
+    slope = np.eye(4)
+    slope[0, 2], slope[1, 2] = -step[1], step[0]
+    slope[:2, 3], slope[3, 3] = step, kept
+    noise = np.zeros((4, 4))
+    turn_noise = HEADING_RAD_PER_SQRT_M**2 * far + (0.01 * turned_rad) ** 2
+    noise[:3, :3] = _turned(pose[2], ALONG_PER_M * far, (SIDE_RAD * far) ** 2, turn_noise)
+    noise[3, 3] = (1.0 - kept**2) * max(scale_sigma, SCALE_SIGMA) ** 2
+    return Track(pose, slope @ track.covariance @ slope.T + noise, kept * track.log_scale)
 
 
 def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Track:
@@ -79,23 +98,23 @@ def with_localizer(track: Track, pose: FloatArray, covariance: FloatArray) -> Tr
 
 def with_pose(track: Track, pose: FloatArray, noise: FloatArray) -> Track:
     """The track after its pose was measured, with a covariance (3, 3)."""
-    track = _with_scale(track)
     difference = pose - track.pose
     difference[2] = wrap_compiled(difference[2])
-    gain = np.asarray(np.linalg.solve((track.covariance + noise).T, track.covariance.T).T, dtype=np.float64)
-    return _shifted(track, gain @ difference, gain, np.eye(3), noise)
+    covariance = track.covariance
+    gain = np.asarray(np.linalg.solve((covariance[:3, :3] + noise).T, covariance[:, :3].T).T, dtype=np.float64)
+    return _shifted(track, gain @ difference, gain, np.eye(4)[:3], noise)
 
 
 def humble(track: Track) -> Track:
     """The track before it hears of another estimate with errors of its own: less sure of itself than it has become."""
-    return replace(track, covariance=track.covariance + np.diag([HUMBLE_M**2, HUMBLE_M**2, 0.0]))
+    return replace(track, covariance=track.covariance + np.diag([HUMBLE_M**2, HUMBLE_M**2, 0.0, 0.0]))
 
 
 def sigmas_apart(track: Track, pose: FloatArray, covariance: FloatArray) -> float:
     """How far a pose with its covariance is from the track's, in standard deviations of both."""
     difference = pose - track.pose
     difference[2] = wrap_compiled(difference[2])
-    whole = _with_scale(track).covariance + covariance
+    whole = track.covariance[:3, :3] + covariance
     return math.sqrt(max(float(difference @ np.linalg.solve(whole, difference)), 0.0))
 
 
@@ -109,15 +128,14 @@ def with_lane(track: Track, reading: RoadReading, lane_point_m: FloatArray, lane
         lane_heading_rad: the lane's direction there.
     """
     fits = True
-    track = _with_scale_across(track, lane_heading_rad)
     if reading.sees_lane:
-        aside = np.array([-math.sin(lane_heading_rad), math.cos(lane_heading_rad), 0.0])
+        aside = np.array([-math.sin(lane_heading_rad), math.cos(lane_heading_rad), 0.0, 0.0])
         expected = float(aside[:2] @ (track.pose[:2] - lane_point_m))
         variance = reading.offset_variance_m2 + LANE_FLOOR_M**2
         track, fits = _measured(track, aside, reading.offset_m - expected, variance)
     if fits and reading.heading_variance_rad2 < math.inf:
         turned = wrap_compiled(lane_heading_rad + reading.heading_rad - track.pose[2])
-        track, _ = _measured(track, np.array([0.0, 0.0, 1.0]), float(turned), reading.heading_variance_rad2 + LANE_FLOOR_RAD**2)
+        track, _ = _measured(track, np.array([0.0, 0.0, 1.0, 0.0]), float(turned), reading.heading_variance_rad2 + LANE_FLOOR_RAD**2)
     return track, fits
 
 
@@ -129,24 +147,44 @@ def with_end(track: Track, reading: RoadReading, to_end_m: float, lane_heading_r
     nearer_m = to_end_m - seen_m  # the vehicle is so much farther along than believed
     if abs(nearer_m) > END_GATE_M:
         return track, False
-    along = np.array([math.cos(lane_heading_rad), math.sin(lane_heading_rad), 0.0])
-    return _measured(_with_scale(track), along, nearer_m, reading.end_variance_m2 + END_FLOOR_M[reading.end] ** 2)
+    along = np.array([math.cos(lane_heading_rad), math.sin(lane_heading_rad), 0.0, 0.0])
+    return _measured(track, along, nearer_m, reading.end_variance_m2 + END_FLOOR_M[reading.end] ** 2)
 
 
 def loosened(track: Track, heading_rad: float) -> Track:
     """The track as it is where lanes that are read again and again tell that it is wrong across."""
-    return replace(track, covariance=track.covariance + _turned(heading_rad, 0.0, LOOSE_M**2, LOOSE_RAD**2))
+    looser = track.covariance.copy()
+    looser[:3, :3] += _turned(heading_rad, 0.0, LOOSE_M**2, LOOSE_RAD**2)
+    return replace(track, covariance=looser)
+
+
+def known_along(track: Track, axis: FloatArray, ahead_m: float, variance_m2: float) -> Track:
+    """The track of which the place on an axis (2,) is known anew: ``ahead_m`` farther than believed, with a variance.
+
+    What is known of all else follows as far as it hangs together with that place: with a = P e / s^2 the state moves by a m and
+    the covariance becomes P + a a^T (v - s^2), which is exact for Gaussians. A place that is a surprise tells that the pose was
+    wrong, and nothing of the scale: so much is added to s^2 first.
+    """
+    row = np.array([*axis, 0.0, 0.0])
+    surprise_m2 = max(ahead_m**2 + variance_m2 - float(row @ track.covariance @ row), 0.0)
+    before = track.covariance + surprise_m2 * np.outer(row, row)
+    cross = before @ row
+    before_m2 = float(row @ cross)
+    if before_m2 <= 0.0:
+        return track
+    share = cross / before_m2
+    return _changed(track, ahead_m * share, before + (variance_m2 - before_m2) * np.outer(share, share))
 
 
 def farther_on(track: Track, ahead_m: float, sigma_m: float) -> tuple[Track, bool]:
     """The track after the ground told that the vehicle is ``ahead_m`` farther along its heading than believed."""
-    along = np.array([math.cos(track.pose[2]), math.sin(track.pose[2]), 0.0])
-    return _measured(_with_scale(track), along, ahead_m, sigma_m**2)
+    along = np.array([math.cos(track.pose[2]), math.sin(track.pose[2]), 0.0, 0.0])
+    return _measured(track, along, ahead_m, sigma_m**2)
 
 
 def beside_border(track: Track, offset_m: float, heading_rad: float, sigma_m: float) -> tuple[Track, bool]:
     """The track after the border beside the path told that the vehicle is ``offset_m`` to the left of where it is believed."""
-    aside = np.array([-math.sin(heading_rad), math.cos(heading_rad), 0.0])
+    aside = np.array([-math.sin(heading_rad), math.cos(heading_rad), 0.0, 0.0])
     return _measured(track, aside, offset_m, sigma_m**2)
 
 
@@ -162,27 +200,15 @@ def _measured(track: Track, row: FloatArray, innovation: float, variance: float)
 
 def _shifted(track: Track, shift: FloatArray, gain: FloatArray, rows: FloatArray, noise: FloatArray) -> Track:
     """Joseph's form (I - K H) P (I - K H)^T + K R K^T, which stays symmetric."""
-    pose = track.pose + shift
+    rest = np.eye(4) - gain @ rows
+    return _changed(track, shift, rest @ track.covariance @ rest.T + gain @ noise @ gain.T)
+
+
+def _changed(track: Track, shift: FloatArray, covariance: FloatArray) -> Track:
+    """The track with its state moved by (4,), and another covariance."""
+    pose = track.pose + shift[:3]
     pose[2] = wrap_compiled(pose[2])
-    rest = np.eye(3) - gain @ rows
-    return Track(pose, rest @ track.covariance @ rest.T + gain @ noise @ gain.T, track.since_m)
-
-
-def _with_scale(track: Track) -> Track:
-    """The track with the scale's error in its covariance, which then begins to grow anew."""
-    if not track.since_m.any():
-        return track
-    covariance = track.covariance.copy()
-    covariance[:2, :2] += SCALE_SIGMA**2 * np.outer(track.since_m, track.since_m)
-    return Track(track.pose, covariance, np.zeros(2))
-
-
-def _with_scale_across(track: Track, heading_rad: float) -> Track:
-    """The same for the part across a heading only: what a lane tells. After a turn that is what was along the way before."""
-    along = np.array([math.cos(heading_rad), math.sin(heading_rad)])
-    kept = float(along @ track.since_m) * along
-    across = _with_scale(replace(track, since_m=track.since_m - kept))
-    return replace(across, since_m=kept)
+    return Track(pose, covariance, track.log_scale + float(shift[3]))
 
 
 def _turned(heading_rad: float, sq_along: float, sq_across: float, sq_heading: float) -> FloatArray:

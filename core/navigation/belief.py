@@ -38,7 +38,7 @@ ONCOMING_M = 8.0  # driven where the borders are those of the oncoming lane: the
 READ_APART_M = 3.0  # of this way a reading may tell at most: between frames one drives less
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
-FOUND_EVERY_M, FOUND_REPEATS = 1.0, 2.0  # the place by the road network is taken in so often, and repeats its errors
+FOUND_EVERY_M, FOUND_REPEATS = 1.0, 10.0  # the place by the road network is taken in so often, and repeats its errors over 10 m
 FOUND_SIGMAS, ELSEWHERE_M = 4.0, 10.0  # driven while that place is so far elsewhere, before it is believed more
 BACKED_SHARE = 0.7  # of the hypotheses that must be where the localizer is, before that is believed
 FOUND_FLOOR = (0.2**2, 0.2**2, 0.02**2)  # variances that a place by the road network has at least
@@ -141,7 +141,7 @@ class Belief:
         self._elsewhere_m = max(self._elsewhere_m - distance_m, 0.0)
         if self._since_found_m > FOUND_EVERY_M:
             self._since_found_m = 0.0
-            self.track = tracks.with_pose(tracks.humble(self.track), found.pose, FOUND_REPEATS * covariance)
+            self.track = tracks.with_pose(self.track, found.pose, FOUND_REPEATS * covariance)
 
     def _follow_localizer(
         self, estimate: LocalizationEstimate, distance_m: float, dt_s: float, found: Place | None, where: Whereabouts | None

@@ -1,12 +1,11 @@
 """Where along the way the pose is, by the ground about the vehicle: what is seen to be road, against what the network has paved.
 
-Across its lane the vehicle is known to centimetres by what it reads; along the way it is known by what passes. At a junction's mouth
-the borders curve away: there the ground tells the place along the way to a tenth of a metre or two. The pose is moved
-along the axis on which it is known worst, which in a street is the street, and after a turn the street before it. Each
-place on that axis has a probability, the one that the pose had there times the one that the ground looks so from there (a
-likelihood field: Thrun, Burgard, Fox, "Probabilistic robotics", 2005, section 6.4); what is left of the axis is its mean and
-variance. So a mouth that is not to be seen where it should be tells something, too, and two mouths that look alike leave the pose
-as unsure as it was.
+Across its lane the vehicle is known to centimetres by what it reads, along the way by what passes. At a junction's mouth the
+borders curve away: there the ground tells the place along the way to some .2 m. The pose is moved along the axis on which it is
+known worst, which in a street is the street. Each place on that axis has a probability: the one that the pose had there, times
+the one that the ground looks so from there (a likelihood field: Thrun, Burgard, Fox, "Probabilistic robotics", 2005, section
+6.4). What is left of the axis is the mean and the variance of these places. So a mouth that is not to be seen where it should
+be tells something, too, and two mouths that look alike leave the pose as unsure as it was.
 """
 
 from __future__ import annotations
@@ -26,13 +25,17 @@ from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.types import FloatArray, Int8Array, UInt8Array
 
 EDGE_M, BLUR_M = 0.2, 0.15  # what is seen of the paving's edge lies so far inside of it, so blurred ..
-WRONG: Final = 0.1  # .. and a tenth of the cells is what it is by chance: vehicles, shade, walls. All three are measured at true poses
+WRONG: Final = (
+    0.1  # .. and a tenth of the cells is what it is by chance: vehicles, shade, walls. All three are measured at true poses
+)
 FORWARD_M, ASIDE_M, GRID_M = (-3.0, 11.0), 8.0, 0.5  # of the ground that is compared
 THIN: Final = 2  # to the sides it is looked at so many times as densely: a kerb is no broader
 LEAST_POINTS: Final = 80  # of it that must be known
 PER_M: Final = 0.03  # weight of a point per metre driven: its error is that of its neighbours, and it is seen over and over again
 LOOK_M: Final = 0.5  # driven between two looks
-ASKEW_RAD: Final = 0.35  # in a turn, where the axis lies across the vehicle's, dead reckoning keeps better what was seen before it
+ASKEW_RAD: Final = (
+    0.35  # in a turn, where the axis lies across the vehicle's, dead reckoning keeps better what was seen before it
+)
 SIGMAS, MORE_M = 3.0, 1.0  # so far either way the place is looked for ..
 STEP_M, SHARE = 0.1, 0.1  # .. in steps of so much, or of such a share of the standard deviation
 STRAY, STRAY_SIGMAS = 0.02, 3.0  # a pose is wrong more than it knows so often, and by so much more
@@ -77,7 +80,7 @@ class GroundFit:
         return track if fit is None else known_along(track, axis, fit.shift_m, fit.variance_m2)
 
     def fit(self, pose: FloatArray, axis: FloatArray, sigma_m: float, ground: Ground, weight: float) -> Fit | None:
-        """What the ground leaves of an axis (2,) of a pose (3,) that is known to ``sigma_m`` on it; None where too little is seen.
+        """What the ground leaves of an axis (2,) of a pose (3,), known to ``sigma_m`` on it; None where too little is seen.
 
         ``weight`` is what a point of the ground counts.
         """
@@ -90,7 +93,9 @@ class GroundFit:
         count = math.ceil(reach_m / step_m)
         shifts = step_m * np.arange(-count, count + 1)
         points, other = np.ascontiguousarray(self._places[:, ::THIN][known]), np.ascontiguousarray(kinds[known] == OTHER)
-        cost = _cost_of(points, other, pose, axis, shifts, self._paved.levels, self._paved.corner_m, self._paved.cell_m, self._cost)
+        cost = _cost_of(
+            points, other, pose, axis, shifts, self._paved.levels, self._paved.corner_m, self._paved.cell_m, self._cost
+        )
         return posterior(shifts, weight * cost, sigma_m)
 
 

@@ -1,10 +1,10 @@
 """The pose that is steered by: the localizer's pose, corrected by the lane and by what is seen across it.
 
-An extended Kalman filter on (x, y, heading, ln of the scale's error) in the network frame. The localizer's pose is a measurement of
-little weight, since its error changes slowly: what it says again and again is the same error. The lane read from a frame corrects
-the pose across the lane and its heading, a stop line or a junction's mouth corrects it along the lane, and so does the ground
-about the vehicle (``ground_fit``). A scale that is wrong makes all metres since the last such correction wrong by the same share,
-and each correction along the way tells of it: so it belongs to the state (a first-order Gauss-Markov process).
+An extended Kalman filter on x, y, heading in the network frame and the logarithm of the scale's error. The localizer's pose is a
+measurement of little weight, since its error changes slowly: what it says again and again is the same error. The lane read from a
+frame corrects the pose across the lane and its heading; a stop line or a junction's mouth corrects it along the lane, and so does
+the ground about the vehicle (``ground_fit``). A wrong scale makes all metres since the last such correction wrong by the same
+share, and each correction along the way tells of it: so it belongs to the state, as a first-order Gauss-Markov process.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ LOCALIZED_M, LOCALIZED_RAD = (
 LANE_FLOOR_M, LANE_FLOOR_RAD = 0.08, 0.02  # a lane read from a frame is not better than that
 END_FLOOR_M = {LaneEnd.STOP_LINE: 0.4, LaneEnd.MOUTH: 0.4}  # nor where a stop line or a mouth lies
 STOP_LINE_BEFORE_END_M = 0.9  # the near edge of a stop line, before the end of the lane
-HUMBLE_M = 0.25  # each metre that the place by the road network is heard
 LOOSE_M, LOOSE_RAD = 1.0, 0.1  # how wrong a pose may be that the lanes contradict
 GATE = 9.0  # squared standard deviations that a measurement of the lane may be off
 END_GATE_M = 4.0  # and metres that an end of the lane may be off: there is another junction beyond
@@ -105,11 +104,6 @@ def with_pose(track: Track, pose: FloatArray, noise: FloatArray) -> Track:
     return _shifted(track, gain @ difference, gain, np.eye(4)[:3], noise)
 
 
-def humble(track: Track) -> Track:
-    """The track before it hears of another estimate with errors of its own: less sure of itself than it has become."""
-    return replace(track, covariance=track.covariance + np.diag([HUMBLE_M**2, HUMBLE_M**2, 0.0, 0.0]))
-
-
 def sigmas_apart(track: Track, pose: FloatArray, covariance: FloatArray) -> float:
     """How far a pose with its covariance is from the track's, in standard deviations of both."""
     difference = pose - track.pose
@@ -135,7 +129,9 @@ def with_lane(track: Track, reading: RoadReading, lane_point_m: FloatArray, lane
         track, fits = _measured(track, aside, reading.offset_m - expected, variance)
     if fits and reading.heading_variance_rad2 < math.inf:
         turned = wrap_compiled(lane_heading_rad + reading.heading_rad - track.pose[2])
-        track, _ = _measured(track, np.array([0.0, 0.0, 1.0, 0.0]), float(turned), reading.heading_variance_rad2 + LANE_FLOOR_RAD**2)
+        track, _ = _measured(
+            track, np.array([0.0, 0.0, 1.0, 0.0]), float(turned), reading.heading_variance_rad2 + LANE_FLOOR_RAD**2
+        )
     return track, fits
 
 

@@ -25,17 +25,15 @@ from hippodrome.core.roads.network import BoolArray
 from hippodrome.core.types import FloatArray, Int8Array, UInt8Array
 
 EDGE_M, BLUR_M = 0.2, 0.15  # what is seen of the paving's edge lies so far inside of it, so blurred ..
-WRONG: Final = (
-    0.1  # .. and a tenth of the cells is what it is by chance: vehicles, shade, walls. All three are measured at true poses
-)
+WRONG: Final = 0.1  # .. and a tenth of the cells is what it is by chance: vehicles, walls; all as measured at true poses
 FORWARD_M, ASIDE_M, GRID_M = (-3.0, 11.0), 8.0, 0.5  # of the ground that is compared
 THIN: Final = 2  # to the sides it is looked at so many times as densely: a kerb is no broader
 LEAST_POINTS: Final = 80  # of it that must be known
 PER_M: Final = 0.03  # weight of a point per metre driven: its error is that of its neighbours, and it is seen over and over again
 LOOK_M: Final = 0.5  # driven between two looks
-ASKEW_RAD: Final = (
-    0.35  # in a turn, where the axis lies across the vehicle's, dead reckoning keeps better what was seen before it
-)
+ASKEW_RAD: Final = 1.2  # at the end of a turn, where the axis lies across the vehicle's, the lane that is read tells more
+MISFIT: Final = 0.2  # mean cost of a point in the best place, from which on the ground is not as the network has it: in fog a
+# pavement looks like a road. With less the place is right to .25 m, in 298 looks about mouths; with more to .6 m, in 25 looks
 SIGMAS, MORE_M = 3.0, 1.0  # so far either way the place is looked for ..
 STEP_M, SHARE = 0.1, 0.1  # .. in steps of so much, or of such a share of the standard deviation
 STRAY, STRAY_SIGMAS = 0.02, 3.0  # a pose is wrong more than it knows so often, and by so much more
@@ -80,9 +78,9 @@ class GroundFit:
         return track if fit is None else known_along(track, axis, fit.shift_m, fit.variance_m2)
 
     def fit(self, pose: FloatArray, axis: FloatArray, sigma_m: float, ground: Ground, weight: float) -> Fit | None:
-        """What the ground leaves of an axis (2,) of a pose (3,), known to ``sigma_m`` on it; None where too little is seen.
+        """What the ground leaves of an axis (2,) of a pose (3,), known to ``sigma_m`` on it.
 
-        ``weight`` is what a point of the ground counts.
+        ``weight`` is what a point of the ground counts. None where too little is seen, or nothing that fits.
         """
         kinds = on_this_side(ground.kinds_at(self._places.reshape(-1, 2)).reshape(self._places.shape[:2]))[:, ::THIN]
         known: BoolArray = (kinds == ROAD) | (kinds == OTHER)
@@ -96,7 +94,7 @@ class GroundFit:
         cost = _cost_of(
             points, other, pose, axis, shifts, self._paved.levels, self._paved.corner_m, self._paved.cell_m, self._cost
         )
-        return posterior(shifts, weight * cost, sigma_m)
+        return posterior(shifts, weight * cost, sigma_m) if float(cost.min()) < MISFIT * len(points) else None
 
 
 def posterior(shifts_m: FloatArray, cost: FloatArray, sigma_m: float) -> Fit:

@@ -89,7 +89,7 @@ class GroundFit:
         reach_m = SIGMAS * sigma_m + MORE_M
         step_m = max(STEP_M, SHARE * sigma_m)
         count = math.ceil(reach_m / step_m)
-        shifts = step_m * np.arange(-count, count + 1)
+        shifts = np.arange(-count, count + 1, dtype=np.float64) * float(step_m)
         points, other = np.ascontiguousarray(self._places[:, ::THIN][known]), np.ascontiguousarray(kinds[known] == OTHER)
         cost = _cost_of(
             points, other, pose, axis, shifts, self._paved.levels, self._paved.corner_m, self._paved.cell_m, self._cost

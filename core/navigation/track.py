@@ -19,7 +19,7 @@ from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray
 
 ALONG_PER_M = 0.005  # variance along the way that each metre adds
-SCALE_SIGMA = 0.035  # and the share of the way that it is wrong by: .025 over 25 m, and for longer the same way
+SCALE_SIGMA = 0.025  # and the share of the way that it is wrong by, however well dashes and views tell the scale: as measured
 SCALE_MEMORY_M = 100.0  # over which that share forgets itself, as dashes and views tell the scale anew
 HEADING_RAD_PER_SQRT_M = 0.003  # random walk of the heading
 SIDE_RAD = 0.005  # drift across per metre

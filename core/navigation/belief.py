@@ -11,19 +11,19 @@ from hippodrome.core import se2
 from hippodrome.core.navigation import track as tracks
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.course import at, offset_and_turn, path_poses
+from hippodrome.core.navigation.ground_fit import GroundFit
+from hippodrome.core.navigation.paving import paving
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced
 from hippodrome.core.navigation.placing import LanePlace, lane_that_is_read, oncoming_place, speaks_for_oncoming
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Indicator
 from hippodrome.core.navigation.whereabouts import Place, Whereabouts
-from hippodrome.core.navigation.witnesses import Witnesses, heard
+from hippodrome.core.navigation.witnesses import Witnesses, heard, measured
 from hippodrome.core.reading.types import RoadReading
 from hippodrome.core.types import FloatArray, LocalizationEstimate, LocalizationStatus, Observation
 
 LOOK_EVERY_S = 0.4  # the localizer's pose is taken in so often: its looks are as frequent
-APART_M, APART_SIGMAS, APART_RAD = 4.0, 3.5, 0.5  # the localizer is elsewhere: so far off
-ASIDE_M = 2.2  # or so far to a side, which is another lane: there the lane that is read is the wrong one
 APART_LOOKS = 12  # and for so many looks: what is steered by is the better of the two for a hundred metres without a view
 VOUCHED_LOOKS = 2  # recognised views that a new fix needs beside the localizer's own word
 BACK_ON_MAP_M = 10.0  # driven on the map again before the localizer is believed more than the lanes and dashes
@@ -37,7 +37,7 @@ ONCOMING_M = 8.0  # driven where the borders are those of the oncoming lane: the
 READ_APART_M = 3.0  # of this way a reading may tell at most: between frames one drives less
 REFUTED_M = 80.0  # a refuted pose is not taken up again over this distance, unless the localizer has gone elsewhere
 SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead, keeps another distance from the border
-FOUND_EVERY_M, FOUND_REPEATS = 1.0, 2.0  # the place by the road network is taken in so often, and repeats its errors
+FOUND_EVERY_M, FOUND_REPEATS = 1.0, 10.0  # the place by the road network is taken in so often, and repeats its errors over 10 m
 FOUND_SIGMAS, ELSEWHERE_M = 4.0, 10.0  # driven while that place is so far elsewhere, before it is believed more
 BACKED_SHARE = 0.7  # of the hypotheses that must be where the localizer is, before that is believed
 FOUND_FLOOR = (0.2**2, 0.2**2, 0.02**2)  # variances that a place by the road network has at least
@@ -67,6 +67,7 @@ class Belief:
         self._refuted: Track | None = None  # a pose of the localizer's that what is seen contradicts, moved along
         self._refuted_m = 0.0
         self.witnesses, self._end_off_m = Witnesses(), math.nan  # and how far off an end of the lane is seen
+        self._ground = GroundFit(paving(planner.roads.network))
 
     def step(
         self,
@@ -161,7 +162,7 @@ class Belief:
             return
         if self._on_map_m < BACK_ON_MAP_M:
             return
-        if not self._is_elsewhere(estimate, self.track):
+        if not tracks.is_elsewhere(self.track, estimate):
             self._apart_looks = 0
             if looked and recognised and distance_m > 0.0:
                 self.track = tracks.with_localizer(self.track, estimate.pose, estimate.covariance)
@@ -181,23 +182,13 @@ class Belief:
         if near.share > BACKED_SHARE:
             self._restart(near.pose, near.covariance + np.diag(FOUND_FLOOR))
 
-    def _is_elsewhere(self, estimate: LocalizationEstimate, track: Track) -> bool:
-        """Whether the localizer believes in another place than the one that is steered by."""
-        apart = estimate.pose[:2] - track.pose[:2]
-        aside_m = abs(float(math.cos(track.pose[2]) * apart[1] - math.sin(track.pose[2]) * apart[0]))
-        apart_m = float(np.hypot(*apart))
-        turned = abs(math.remainder(float(estimate.pose[2] - track.pose[2]), 2.0 * math.pi))
-        sigma_m = track.sigma_m + math.sqrt(max(0.5 * float(np.trace(estimate.covariance[:2, :2])), 0.0))
-        is_far = apart_m > max(APART_M, APART_SIGMAS * sigma_m) or aside_m > max(ASIDE_M, APART_SIGMAS * sigma_m)
-        return is_far or turned > APART_RAD
-
     def _is_refuted(self, estimate: LocalizationEstimate, distance_m: float) -> bool:
         """Whether the localizer still says what was seen to be wrong."""
         if self._refuted is None:
             return False
         self._refuted_m += abs(distance_m)
         apart_m = float(np.hypot(*(estimate.pose[:2] - self._refuted.pose[:2])))
-        if apart_m > APART_M or self._refuted_m > REFUTED_M:
+        if apart_m > tracks.APART_M or self._refuted_m > REFUTED_M:
             self._refuted = None
         return self._refuted is not None
 
@@ -225,6 +216,9 @@ class Belief:
         self._since_read_m += distance_m
         if observation.frame is None or observation.speed <= 0.0 or self.turns_round:
             return
+        before, self.track = self.track, self._ground.step(self.track, senses.ground, self._since_read_m)
+        told_m = tracks.told_along_m(before, self.track)
+        self.witnesses = measured(self.witnesses, told_m, float(self.track.pose[2]))
         self._check_by_sight(estimate, senses)
         since_read_m, self._since_read_m = min(self._since_read_m, READ_APART_M), 0.0
         if reading is None or self.track is None:

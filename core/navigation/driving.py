@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from hippodrome.core.navigation.config import DriveConfig, VehicleShape
-from hippodrome.core.navigation.course import Course, at, next_gate
+from hippodrome.core.navigation.course import Course, Gate, at, next_gate
 from hippodrome.core.navigation.junctions import SIGHT_M, gate_speed_mps, is_barred
 from hippodrome.core.navigation.speed import stopping_mps
 from hippodrome.core.navigation.types import Indicator, Radar
@@ -15,6 +15,11 @@ LOOK_S = 0.4  # braking begins so early: the speed follows the wanted one with a
 GOAL_BRAKING_MPS2 = 1.2  # gentle, since the last metre counts
 CHANGE_INDICATED_M = 25.0  # before a lane change
 BARRED = "waits: somebody stands beyond the junction"
+TURN_SIGMA_M = 0.6  # a turn is driven as ever where its place along the way is known so well: a corner forgives about twice that
+TURN_AHEAD_M, WALK_MPS = (
+    15.0,
+    1.5,
+)  # and slower so far before it where not, at walking pace at least: its mouth is in view by then
 SLOWEST_MPS = 2.5  # however unsure the place: a vehicle that stands learns nothing of it
 
 
@@ -29,9 +34,16 @@ class Pace:
 
 
 def pace(
-    course: Course, u_m: float, speed_mps: float, radar: Radar, sigma_m: float, config: DriveConfig, vehicle: VehicleShape
+    course: Course,
+    u_m: float,
+    speed_mps: float,
+    radar: Radar,
+    sigma_m: float,
+    config: DriveConfig,
+    vehicle: VehicleShape,
+    along_sigma_m: float = 0.0,
 ) -> Pace:
-    """The speed at the place ``u_m`` of a course whose position is known to ``sigma_m``."""
+    """The speed at the place ``u_m`` of a course whose position is known to ``sigma_m``, and along it to ``along_sigma_m``."""
     wanted, reason = at(course.speed_mps, u_m + LOOK_S * speed_mps), ""
     if sigma_m > config.unsure_m:
         unsure = max(wanted * config.unsure_m / sigma_m, min(wanted, SLOWEST_MPS))
@@ -47,6 +59,9 @@ def pace(
         to_stop_m = gate.entry_u_m - vehicle.front_m - config.stop_before_m - u_m
         if to_stop_m < SIGHT_M:
             indicator = gate.indicator
+        unsure = turn_mps(gate, u_m, wanted, along_sigma_m)
+        if unsure < wanted:
+            wanted, reason = unsure, "slows down: the mouth is not known well"
         slowed, why = gate_speed_mps(to_stop_m, speed_mps, radar, config)
         if gate.indicator is Indicator.STRAIGHT and is_barred(to_stop_m, speed_mps, radar):
             slowed, why = stopping_mps(to_stop_m, config.braking_mps2), BARRED
@@ -56,6 +71,14 @@ def pace(
     if indicator is Indicator.STRAIGHT:
         indicator = _change_indicated(course, u_m)
     return Pace(wanted if math.isfinite(wanted) else 0.0, indicator, reason, stop_m)
+
+
+def turn_mps(gate: Gate, u_m: float, wanted_mps: float, along_sigma_m: float) -> float:
+    """The speed before a turn whose place along the way is known to ``along_sigma_m``: slow where that is not enough to turn."""
+    is_near = 0.0 < gate.entry_u_m - u_m < TURN_AHEAD_M and gate.indicator is not Indicator.STRAIGHT
+    if not is_near or along_sigma_m <= TURN_SIGMA_M:
+        return wanted_mps
+    return min(wanted_mps, max(wanted_mps * TURN_SIGMA_M / along_sigma_m, WALK_MPS))
 
 
 def _change_indicated(course: Course, u_m: float) -> Indicator:

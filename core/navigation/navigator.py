@@ -248,7 +248,8 @@ class Navigator:
         """On the course."""
         assert self._belief.plan is not None and self._belief.track is not None and self.estimate is not None
         config, speed, plan = self._config, self._senses.motion.speed_mps, self._belief.plan
-        step = pace(plan.course, plan.u_m, speed, radar, self._belief.track.sigma_m, config.drive, config.vehicle)
+        track = self._belief.track
+        step = pace(plan.course, plan.u_m, speed, radar, track.sigma_m, config.drive, config.vehicle, track.along_sigma_m)
         wanted, reason, state = step.speed_mps, step.reason, DrivingState.DRIVING
         if self._belief.track.sigma_m > self._config.drive.doubt_sigma_m:
             state = DrivingState.DOUBTING

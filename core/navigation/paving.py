@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import cv2
@@ -52,6 +53,7 @@ def grid_over(
     return low, cell_m, (int(shape[0]), int(shape[1]))
 
 
+@lru_cache(maxsize=2)
 def paving(network: RoadNetwork) -> Paving:
     """The raster of a network."""
     low, cell_m, shape = grid_over(network, RIM_M, CELL_M, MOST_CELLS)

@@ -148,13 +148,28 @@ def test_what_a_wrong_scale_does_grows_with_the_way_and_goes_into_the_next_stree
     track = tracks.begun(np.zeros(3), np.diag([1e-4, 1e-4, 1e-6]))
     for _ in range(100):
         track = tracks.moved(track, 1.0, 0.0)
-    assert track.along_sigma_m == pytest.approx(
-        math.hypot(100 * tracks.SCALE_SIGMA, math.sqrt(100 * tracks.ALONG_PER_M)), rel=0.05
-    )
+    way = 100.0 / tracks.SCALE_MEMORY_M  # the integral of a Gauss-Markov process: 2 s^2 L^2 (d/L - 1 + exp(-d/L))
+    scale_m = tracks.SCALE_SIGMA * tracks.SCALE_MEMORY_M * math.sqrt(2.0 * (way - 1.0 + math.exp(-way)))
+    assert track.along_sigma_m == pytest.approx(math.hypot(scale_m, math.sqrt(100 * tracks.ALONG_PER_M)), rel=0.05)
     turned = tracks.moved(track, 0.01, 0.5 * math.pi)
     reading = RoadReading(offset_m=0.0, offset_variance_m2=0.01)
     known = tracks.with_lane(turned, reading, turned.pose[:2], 0.5 * math.pi)[0]
-    assert turned.covariance[0, 0] < 1.0 < 100.0 * tracks.SCALE_SIGMA and known.covariance[0, 0] < 0.05
+    assert turned.covariance[0, 0] > 1.0 and known.covariance[0, 0] < 0.05
+
+
+def test_a_place_along_the_way_tells_of_the_scale_unless_it_is_a_surprise():
+    track = tracks.begun(np.zeros(3), np.diag([0.01, 0.01, 1e-6]))
+    for _ in range(40):
+        track = tracks.moved(track, 1.0, 0.0)
+    axis, sigma_m = track.worst_axis()
+    np.testing.assert_allclose(axis, [1.0, 0.0], atol=0.01)
+    ahead = tracks.known_along(track, axis, 0.5, 0.04)
+    assert ahead.pose[0] == pytest.approx(40.5, abs=0.01) and ahead.covariance[0, 0] == pytest.approx(0.04, rel=0.01)
+    share = track.covariance[0, 3] / track.covariance[0, 0]  # the scale follows the place as the covariance has it
+    assert ahead.metres_off == pytest.approx(0.5 * share, rel=0.01) and 0.08 < ahead.metres_off < 0.8
+    far = tracks.known_along(track, axis, 8.0, 0.04)  # seven standard deviations: the pose was wrong, and the scale need not be
+    assert far.pose[0] == pytest.approx(48.0, abs=0.01) and far.metres_off < 8.0 * share / 20.0
+    assert sigma_m < 1.3 and np.linalg.eigvalsh(far.covariance).min() > -1e-9
 
 
 def failing(observe, radar=Radar(), seconds=5.0, speed=5.0, wheels=0.0):
@@ -162,6 +177,13 @@ def failing(observe, radar=Radar(), seconds=5.0, speed=5.0, wheels=0.0):
     for k in range(round(10 * seconds)):
         health = watched(health, observe(k), radar, speed, wheels, WatchConfig(), VEHICLE)
     return health.complaint(WatchConfig())
+
+
+def test_what_a_measurement_told_is_what_it_left():
+    before = tracks.begun(np.zeros(3), np.diag([1.0, 1.0, 1e-6]))
+    after = tracks.known_along(before, np.array([1.0, 0.0]), 0.1, 0.2)
+    assert tracks.told_along_m(before, after) == pytest.approx(0.5)  # 1 / (1 / .2 - 1 / 1) = .25
+    assert tracks.told_along_m(before, before) == math.inf
 
 
 def test_sensors_that_fail_are_named():

@@ -1,11 +1,12 @@
 """The pose that is steered by: the localizer's pose, corrected by the lane and by what is seen across it.
 
-An extended Kalman filter on x, y, heading in the network frame and the error of the metres, in standard deviations. The localizer's pose is a
-measurement of little weight, since its error changes slowly: what it says again and again is the same error. The lane read from a
-frame corrects the pose across the lane and its heading; a stop line or a junction's mouth corrects it along the lane, and so does
-the ground about the vehicle (``ground_fit``). Metres since the last such correction are all wrong by about the same share, and
-each correction along the way tells of it: so it belongs to the state, as a first-order Gauss-Markov process of variance 1. How
-large a share that is changes with what tells the metres, dashes or the odometry's scale, and is told with each step.
+An extended Kalman filter on x, y, heading in the network frame and the error of the metres, in standard deviations. The
+localizer's pose is a measurement of little weight, since its error changes slowly: what it says again and again is the same
+error. The lane read from a frame corrects the pose across the lane and its heading; a stop line or a junction's mouth corrects it
+along the lane, and so does the ground about the vehicle (``ground_fit``). Metres since the last such correction are all wrong by
+about the same share, and each correction along the way tells of it: so it belongs to the state, as a first-order Gauss-Markov
+process of variance 1. How large a share that is changes with what tells the metres, dashes or the odometry's scale, and is told
+with each step.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from hippodrome.core.navigation.belief import Belief
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.pilot import RoutePlanner
 from hippodrome.core.navigation.senses import Senses
-from hippodrome.core.navigation.track import begun
+from hippodrome.core.navigation.track import begun, is_elsewhere
 from hippodrome.core.navigation.types import Radar
 from tests.core.navigation.roads import Bicycle, map_along, ring
 
@@ -43,10 +43,8 @@ def test_a_metre_aside_moves_the_pose_slowly():
     ("ahead_m", "aside_m", "elsewhere"), [(0.0, 1.5, False), (0.0, 3.2, True), (3.2, 0.0, False), (5.0, 0.0, True)]
 )
 def test_another_lane_is_another_place_and_a_little_farther_on_is_not(ahead_m, aside_m, elsewhere):
-    network, car = ring(), Bicycle((20.0, 0.0, 0.0))
-    config = NavigatorConfig()
-    belief = Belief(config, RoutePlanner(map_along(network), network, config), -1.0)
+    car = Bicycle((20.0, 0.0, 0.0))
     estimate = car.step(car.sense(frame=None))
     estimate.pose[:2] += ahead_m, aside_m
     track = begun(np.array([20.0, 0.0, 0.0]), np.diag([0.04, 0.04, 1e-4]))
-    assert belief._is_elsewhere(estimate, track) is elsewhere
+    assert is_elsewhere(track, estimate) is elsewhere

@@ -14,11 +14,12 @@ from hippodrome.core.navigation.course import at, offset_and_turn, path_poses
 from hippodrome.core.navigation.ground_fit import GroundFit
 from hippodrome.core.navigation.paving import paving
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced
+from hippodrome.core.navigation.places import Place
 from hippodrome.core.navigation.placing import LanePlace, lane_that_is_read, oncoming_place, speaks_for_oncoming
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Indicator
-from hippodrome.core.navigation.whereabouts import Place, Whereabouts
+from hippodrome.core.navigation.whereabouts import Whereabouts
 from hippodrome.core.navigation.witnesses import Witnesses, heard, measured
 from hippodrome.core.reading.types import RoadReading
 from hippodrome.core.types import FloatArray, LocalizationEstimate, LocalizationStatus, Observation

@@ -22,6 +22,7 @@ from hippodrome.core.navigation.course import Course, make_course, path_poses, p
 from hippodrome.core.navigation.driving import pace
 from hippodrome.core.navigation.junctions import gate_speed_mps
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
+from hippodrome.core.navigation.places import Place
 from hippodrome.core.navigation.placing import lane_of
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2, stopping_mps
@@ -29,7 +30,7 @@ from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Command, DrivingState, Radar
 from hippodrome.core.navigation.ways import drawn_on, moved, strip, way_poses, ways_ahead
-from hippodrome.core.navigation.whereabouts import Place, Whereabouts
+from hippodrome.core.navigation.whereabouts import Whereabouts
 from hippodrome.core.navigation.witnesses import Witnesses
 from hippodrome.core.reading.types import LaneEnd, RoadReading
 from hippodrome.core.roads.paths import Piece
@@ -41,7 +42,6 @@ TRIED: Final = 8  # .. and those whose ways ahead are tried
 LOOK_M: Final = 26.0  # of a way
 WAY_M: Final = 45.0  # of a way that is driven: another one is looked for before its end
 AGREED, GUESSED = 0.9, 0.6  # share of the poses that have a lane where the way is; with less, it is driven at a walk
-GUESSED_MPS: Final = 2.0
 GUESS_FITS: Final = 0.85  # where the ground fits worse, even what all places agree on is a guess
 SEEN_M, SEEN, NOT_ROAD = (2.0, 8.0), 0.7, 0.05  # of a guess: so much must have been seen, and hardly any of it be no road
 BEFORE_END_M: Final = 0.3  # the bumper stops so far before a stop line or a junction's mouth that is seen
@@ -54,7 +54,7 @@ NEAR_GOAL_M: Final = 25.0  # whoever is not sure of the place does not stop at t
 AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of the way, which must not lead off the road
 OFF_ROAD, OFF_ROAD_LOOKS = 0.15, 2
 FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 12.0  # a place so sure, for so long, is a fix
-SAME_PLACE_M, GUIDED_MPS = 12.0, 6.0  # hypotheses so near to the goal are no other place: how far along they are is asked apart
+SAME_PLACE_M, GUIDED_MPS, GUESSED_MPS = 12.0, 6.0, 2.0  # hypotheses so near to the goal are of one place
 REASON, GUESS = "drives where all likely places have a lane", "creeps where most likely places have a lane"
 
 
@@ -115,23 +115,23 @@ class Guide:
         turned_rad: float,
         senses: Senses,
         told: FloatArray | None,
-        searches: bool,
+        held: FloatArray | None,
         turns_round: bool = False,
     ) -> None:
-        """Take a step in; only where the vehicle ``searches`` a way is looked for.
+        """Take a step in; only where the vehicle has no pose to steer by a way is looked for.
 
         Args:
             distance_m: driven.
             turned_rad: meanwhile.
             senses: what is sensed.
             told: (3,) the pose by the localizer, where it recognised a view.
-            searches: whether the vehicle does.
+            held: (3,) the pose that is steered by; None while the vehicle searches.
             turns_round: whether it is about to turn round in the street.
         """
         if self._turned_round and not turns_round:
             self.whereabouts.turn_round()
         self._turned_round = turns_round
-        self.whereabouts.step(distance_m, turned_rad, senses, senses.scale_sigma, told)
+        self.whereabouts.step(distance_m, turned_rad, senses, senses.scale_sigma, told, held)
         if self.pose is not None:
             self.pose = moved(self.pose, distance_m, turned_rad)
         if self.place is not None:
@@ -140,9 +140,9 @@ class Guide:
         self._see_end(senses.reading, distance_m)
         self._since_look_m, self._since_try_m = self._since_look_m + abs(distance_m), self._since_try_m + abs(distance_m)
         if self._since_look_m >= 1.0:
-            self._look(senses, searches)
+            self._look(senses, held is None)
             self._since_look_m = 0.0
-        if not searches:
+        if held is not None:
             self.plan = self.pose = None
         elif self.plan is not None and self.pose is not None:
             self.plan = advanced(self.plan, self.pose)

@@ -26,6 +26,22 @@ AGAINST_RAD: Final = 2.0  # against its lane a particle has turned round
 LATE_M: Final = 0.3  # beyond its border a particle changes to the lane beside it
 
 
+def scattered(pose: FloatArray, scatter: FloatArray, along_m: float, aside_m: float, lane_rad: float) -> FloatArray:
+    """Particles (n, COLUMNS) about a pose (3,) on a lane: ``scatter`` (n, 4) is added to x, y, heading and the scale."""
+    rows = np.zeros((len(scatter), COLUMNS))
+    rows[:, :4] = scatter + np.array([*pose, 0.0])
+    rows[:, ALONG], rows[:, ASIDE] = along_m, aside_m
+    rows[:, TURN] = math.remainder(float(pose[2]) - lane_rad, 2.0 * math.pi)
+    return rows
+
+
+def move_aside(rows: FloatArray, aside_m: float) -> None:
+    """Move particles to the left of their headings."""
+    rows[:, X] -= aside_m * np.sin(rows[:, HEADING])
+    rows[:, Y] += aside_m * np.cos(rows[:, HEADING])
+    rows[:, ASIDE] += aside_m
+
+
 @njit(cache=True)
 def _wrap(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi

@@ -140,3 +140,8 @@ def told(motion: Motion, metres_per_unit: float, distance_m: float) -> Motion:
     far_m = abs(distance_m)
     smooth = motion.told + min(share * far_m, 1.0) * (new - motion.told)
     return replace(motion, told=smooth, told_m=motion.told_m + far_m, untold_m=0.0)
+
+
+def untold(motion: Motion) -> Motion:
+    """The motion without what the localizer told of the scale."""
+    return replace(motion, told=math.nan, told_m=0.0)

@@ -26,6 +26,7 @@ from hippodrome.core.navigation.escape import Escape
 from hippodrome.core.navigation.footing import Footing
 from hippodrome.core.navigation.guidance import Guide
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, is_missed
+from hippodrome.core.navigation.places import Place
 from hippodrome.core.navigation.placing import keeps_left, lane_of
 from hippodrome.core.navigation.searching import search_step
 from hippodrome.core.navigation.senses import Senses
@@ -35,7 +36,6 @@ from hippodrome.core.navigation.streets import StreetMemory
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Command, DrivingState, Goal, Indicator, Radar
 from hippodrome.core.navigation.watch import SensorHealth, is_dark, watched
-from hippodrome.core.navigation.whereabouts import Place
 from hippodrome.core.navigation.witnesses import measured
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import CognitiveMap, LocalizationEstimate, LocalizationStatus, Observation
@@ -48,6 +48,7 @@ MORE_M = 3.0  # backed off beyond where the vehicle came off the road
 NO_ROOM = "no way leads on, and there is no room to turn round"
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
 ROUND_M = 250.0  # searched round one block, then straight on to the next ones, and so in turn
+FOUND_AGAIN_M = 20.0  # driven before the localizer found the place again: it has yet to find the scale, and is heard anew
 ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
 
 
@@ -94,7 +95,7 @@ class Navigator:
         self._streets = None if config.exact_poses else StreetMemory(config.localizer.views)
         self._health = SensorHealth()
         self._has_goal = False
-        self._at_goal_s = self._search_stood_s = self._searched_m = 0.0
+        self._at_goal_s = self._search_stood_s = self._searched_m = self._unknown_m = 0.0
         self._arrived = False
         self.estimate: LocalizationEstimate | None = None  # the localizer's last answer, for who looks on
 
@@ -123,9 +124,7 @@ class Navigator:
         if observation.frame is not None and is_dark(observation.frame, config.watch.dark_level):
             observation = replace(observation, frame=None)
         self.estimate = self._localizer.step(observation)
-        is_known = self.estimate.localized and self.estimate.status is LocalizationStatus.LOCALIZED
-        told_scale = self._localizer.metres_per_unit if is_known else self._guessed_scale()
-        distance_m = senses.step(observation, radar, told_scale)
+        distance_m = senses.step(observation, radar, self._told_scale(self.estimate, dt_s))
         found = self._guess(observation, distance_m)
         where = None if self._guide is None else self._guide.whereabouts
         self._belief.step(observation, self.estimate, distance_m, senses, found, where)
@@ -150,8 +149,14 @@ class Navigator:
         if belief.track is not None and not math.isnan(sigma_m):
             belief.witnesses = measured(belief.witnesses, sigma_m, float(belief.track.pose[2]))
 
-    def _guessed_scale(self) -> float | None:
-        """Metres per unit of the odometry by the hypotheses, where they are sure of the place."""
+    def _told_scale(self, estimate: LocalizationEstimate, dt_s: float) -> float | None:
+        """Metres per unit by the localizer where it knows the place, else by the hypotheses where they are sure."""
+        if estimate.localized and estimate.status is LocalizationStatus.LOCALIZED:
+            if self._unknown_m > FOUND_AGAIN_M:
+                self._senses.motion = motions.untold(self._senses.motion)
+            self._unknown_m = 0.0
+            return self._localizer.metres_per_unit
+        self._unknown_m += abs(self._senses.motion.speed_mps) * dt_s
         if self._guide is None or self._guide.fix is None:
             return None
         return self._senses.metres_per_unit * math.exp(self._guide.whereabouts.log_scale)
@@ -162,7 +167,8 @@ class Navigator:
             return None
         turned_rad = observation.yaw_rate_radps * observation.dt_s
         told = None if self.estimate is None else self._belief.recognised_pose(self.estimate)
-        self._guide.step(distance_m, turned_rad, self._senses, told, self._belief.track is None, self._belief.turns_round)
+        held = None if self._belief.track is None else self._belief.track.pose
+        self._guide.step(distance_m, turned_rad, self._senses, told, held, self._belief.turns_round)
         return self._guide.fix
 
     def _decide(self, radar: Radar, dt_s: float) -> Command:

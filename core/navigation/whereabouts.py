@@ -7,7 +7,6 @@ few of them carry the weight, and asked: which places are left, and how much spe
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -15,7 +14,8 @@ import numpy as np
 from hippodrome.core.navigation import hypotheses as hyp
 from hippodrome.core.navigation.glance import ground_cost, ground_points, mean_rad, segment_at
 from hippodrome.core.navigation.paving import Paving, paving
-from hippodrome.core.navigation.placing import opposite_lanes
+from hippodrome.core.navigation.places import Place
+from hippodrome.core.navigation.placing import lane_of, opposite_lanes
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.track import STOP_LINE_BEFORE_END_M
 from hippodrome.core.reading.types import LaneEnd, RoadReading
@@ -32,6 +32,8 @@ GROUND_PER_M: Final = 0.06  # .. and each point of it counts so much per metre: 
 READ_SIGMA_M, READ_GATE_M, READ_GATE_RAD, READ_GAIN, READ_WEIGHT = 0.4, 1.2, 0.35, 0.2, 0.15
 END_SIGMA_M, END_OUTLIER, END_WEIGHT = 0.8, 0.2, 0.3
 TOLD_M, TOLD_RAD, TOLD_OUTLIER, TOLD_PER_M = 1.5, 0.3, 0.02, 0.4  # of the localizer's pose, whose errors repeat
+UNTHOUGHT, RESET, RESET_COUNT = 0.02, 0.05, 200  # where a recognised view has less of the weight, so much begins there anew
+HELD: Final = 0.5  # and so much at the pose that is steered by, where all begin anew
 SURE_M2: Final = 0.05  # variance of an offset in the lane that is taken in
 JITTER: Final = (0.15, 0.15, 0.006, 0.15)  # of renewed particles: m, m, rad, and standard deviations of the scale
 WIDE, WIDE_EVERY = 6.0, 10  # of every so many renewed ones one gets so much more, in case all are a little wrong
@@ -42,32 +44,6 @@ CLUSTER_M, CLUSTER_RAD = 5.0, 0.7  # particles so near to one another are of one
 LEAST_POINTS: Final = 20  # of the ground, which must be known
 SPREAD: Final = (2.0, 2.0, 0.06)  # m, m, rad: how far off all may be that are beside the road
 SEED: Final = 17
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Place:
-    """A place where the vehicle may be.
-
-    Args:
-        pose: (3,) the mean of the particles there, in the network frame.
-        covariance: (3, 3) of them.
-        share: of all the weight.
-        agreement: share of the ground about it that is as the network says, averaged over the last metres.
-    """
-
-    pose: FloatArray
-    covariance: FloatArray
-    share: float
-    agreement: float
-
-    @property
-    def sigma_m(self) -> float:
-        """Standard deviation of the position, over both axes."""
-        return math.sqrt(max(float(self.covariance[0, 0] + self.covariance[1, 1]), 0.0))
-
-    def at(self, pose: FloatArray) -> Place:
-        """The place with another pose."""
-        return replace(self, pose=pose)
 
 
 class Whereabouts:
@@ -130,7 +106,13 @@ class Whereabouts:
         return self._scale_sigma * float(self._shares() @ self._rows[: self._count, hyp.SCALE])
 
     def step(
-        self, distance_m: float, turned_rad: float, senses: Senses, scale_sigma: float, told: FloatArray | None = None
+        self,
+        distance_m: float,
+        turned_rad: float,
+        senses: Senses,
+        scale_sigma: float,
+        told: FloatArray | None = None,
+        held: FloatArray | None = None,
     ) -> None:
         """Take a step of the vehicle in.
 
@@ -140,6 +122,7 @@ class Whereabouts:
             senses: what is sensed.
             scale_sigma: standard deviation of ln(scale).
             told: (3,) the pose by the localizer, where it recognised a view.
+            held: (3,) the pose that is steered by, if there is one.
         """
         if distance_m == 0.0 and turned_rad == 0.0:
             return
@@ -154,8 +137,10 @@ class Whereabouts:
             if told is not None:
                 weight = TOLD_PER_M * self._since_look_m
                 hyp.weigh_by_pose(self._rows, self._count, told, TOLD_M, TOLD_RAD, TOLD_OUTLIER, weight)
+                if self.about(told, CLUSTER_M)[0] < UNTHOUGHT:
+                    self._reset_to(told, RESET)
             if self._look(senses, self._since_look_m):
-                self._doubt(senses, self._since_look_m)
+                self._doubt(senses, self._since_look_m, held)
             self._since_look_m = 0.0
             self._renew()
 
@@ -166,10 +151,7 @@ class Whereabouts:
 
     def move_aside(self, aside_m: float) -> None:
         """Move all hypotheses to the left of their headings."""
-        rows = self._rows[: self._count]
-        rows[:, hyp.X] -= aside_m * np.sin(rows[:, hyp.HEADING])
-        rows[:, hyp.Y] += aside_m * np.cos(rows[:, hyp.HEADING])
-        rows[:, hyp.ASIDE] += aside_m
+        hyp.move_aside(self._rows[: self._count], aside_m)
 
     def spread(self) -> None:
         """Let each hypothesis be some metres off: the vehicle is beside the road, where none of the likely ones has it."""
@@ -193,6 +175,21 @@ class Whereabouts:
                 END_OUTLIER, END_WEIGHT,
             )  # fmt: skip
 
+    def _reset_to(self, pose: FloatArray, reset: float) -> None:
+        """Begin hypotheses of some weight at a pose, whoever has it: sensor resetting (Lenser, Veloso, ICRA 2000)."""
+        place = lane_of(self._roads, pose)
+        if place is None or self._count < 2 * RESET_COUNT:
+            return
+        logs = self._rows[: self._count, hyp.WEIGHT]
+        lightest = np.argpartition(logs, RESET_COUNT)[:RESET_COUNT]
+        rest = float(np.exp(np.delete(logs, lightest) - logs.max()).sum())
+        scatter = self._rng.standard_normal((RESET_COUNT, 4)) * (TOLD_M, 0.5 * TOLD_M, 0.2 * TOLD_RAD, 1.0)
+        rows = hyp.scattered(pose, scatter, place.position_m, place.offset_m, place.heading_rad)
+        rows[:, hyp.WEIGHT] = logs.max() + math.log(reset / (1.0 - reset) * rest / RESET_COUNT)
+        self._rows[lightest] = rows
+        self._segments[lightest] = segment_at(self._roads, np.array([place.lane]), np.array([place.position_m]))[0]
+        self._agreement[lightest] = self.fits
+
     def _wander(self, driven_m: float) -> None:
         """Let the scales wander, as that of the odometry does: an Ornstein-Uhlenbeck process that keeps its spread."""
         kept = math.exp(-driven_m / SCALE_MEMORY_M)
@@ -215,13 +212,15 @@ class Whereabouts:
         )  # fmt: skip
         return True
 
-    def _doubt(self, senses: Senses, driven_m: float) -> None:
-        """Begin anew where not even the likeliest hypotheses have the ground as it is."""
+    def _doubt(self, senses: Senses, driven_m: float, held: FloatArray | None) -> None:
+        """Begin anew where not even the likeliest have the ground so. It may be misread in fog: half begin where it was."""
         self.fits += min(LOST_PER_M * driven_m, 1.0) * (float(self._shares() @ self._agreement[: self._count]) - self.fits)
         if self.fits < LOST:
             memory = senses.memory
             self.begin(*((memory.offset_m, memory.heading_rad) if memory.is_fresh else (0.0, 0.0)))
             self.restarts += 1
+            if held is not None:
+                self._reset_to(held, HELD)
 
     def _shares(self) -> FloatArray:
         """The weights (n,), adding up to 1."""

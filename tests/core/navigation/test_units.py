@@ -209,3 +209,13 @@ def test_dashes_that_turns_contradict_are_dropped():
     assert not wrong.dashes_fit(1.6) and wrong.metres_per_unit(1.6) == pytest.approx(2.0, rel=0.03)
     assert motions.seen(motions.Motion(), 15.0, 10.0).dashes_fit(1.6)  # nothing contradicts them yet
     assert not motions.unseen(wrong).dashes_fit(1.6)
+
+
+def test_a_scale_that_is_told_anew_is_heard_as_at_the_first_time():
+    known = motions.Motion()
+    for _ in range(200):
+        known = motions.told(known, 2.0, 1.0)
+    again = motions.told(motions.untold(known), 1.0, 1.0)
+    expected = motions.told(motions.Motion(), 1.0, 1.0)
+    assert again.scale_without_dashes(1.5) == expected.scale_without_dashes(1.5)
+    assert known.scale_without_dashes(1.5)[1] < 0.5 * again.scale_without_dashes(1.5)[1]

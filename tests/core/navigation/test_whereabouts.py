@@ -117,7 +117,7 @@ def guide_on(network):
 def test_two_roads_that_are_alike_stay_two_and_give_no_fix_but_a_way():
     network = twins()
     guide, eyes = guide_on(network), Eyes(network)
-    here = drive(lambda d, t, eyes: guide.step(d, t, eyes, None, True), eyes, (20.0, 0.0, 0.0), LEFT)
+    here = drive(lambda d, t, eyes: guide.step(d, t, eyes, None, None), eyes, (20.0, 0.0, 0.0), LEFT)
     other = here + np.array([0.0, 300.0, 0.0])
     assert guide.fix is None
     assert 0.2 < guide.whereabouts.near(here).share < 0.8 and 0.2 < guide.whereabouts.near(other).share < 0.8
@@ -127,7 +127,7 @@ def test_two_roads_that_are_alike_stay_two_and_give_no_fix_but_a_way():
 def test_what_tells_them_apart_gives_a_fix_at_the_right_place():
     network = bends((0.0, 0.0, 1.0), (0.0, 300.0, -1.0))
     guide, eyes = guide_on(network), Eyes(network)
-    truth = drive(lambda d, t, eyes: guide.step(d, t, eyes, None, True), eyes, (20.0, 0.0, 0.0), [*LEFT[:2], (10.0, 0.0)])
+    truth = drive(lambda d, t, eyes: guide.step(d, t, eyes, None, None), eyes, (20.0, 0.0, 0.0), [*LEFT[:2], (10.0, 0.0)])
     assert guide.fix is not None and np.hypot(*(guide.fix.pose - truth)[:2]) < 1.5
     here, there = (begun(truth + np.array([0.0, y, 0.0]), np.diag([0.04, 0.04, 1e-4])) for y in (0.0, 300.0))
     assert guide.vouches(here, Witnesses(), 1.5) and not guide.vouches(there, Witnesses(), 1.5)
@@ -140,7 +140,7 @@ def test_what_tells_them_apart_gives_a_fix_at_the_right_place():
 def test_a_recognised_view_decides_between_roads_that_are_alike():
     network = twins()
     guide, eyes = guide_on(network), Eyes(network)
-    drive(lambda d, t, eyes: guide.step(d, t, eyes, eyes.pose.copy(), True), eyes, (20.0, 0.0, 0.0), [(30.0, 0.0)])
+    drive(lambda d, t, eyes: guide.step(d, t, eyes, eyes.pose.copy(), None), eyes, (20.0, 0.0, 0.0), [(30.0, 0.0)])
     assert guide.fix is not None and abs(guide.fix.pose[1]) < 1.0
 
 
@@ -151,7 +151,7 @@ def test_a_road_that_the_network_does_not_have_gives_no_fix(turn_rad):
     side = math.copysign(1.0, turn_rad)
     eyes = Eyes(network_of([[(0.0, 0.0), (40.0, 0.0)], [(40.0, 0.0), (40.0, 90.0 * side)]], [(0, 1)]))
     drive(
-        lambda d, t, eyes: guide.step(d, t, eyes, None, True), eyes, (20.0, 0.0, 0.0), [(18.0, 0.0), (4.0, turn_rad), (60.0, 0.0)]
+        lambda d, t, eyes: guide.step(d, t, eyes, None, None), eyes, (20.0, 0.0, 0.0), [(18.0, 0.0), (4.0, turn_rad), (60.0, 0.0)]
     )
     assert guide.fix is None
     assert guide.whereabouts.restarts > 0 or guide.place.share < 0.99
@@ -198,7 +198,7 @@ def test_ways_ahead_are_all_ways_on_but_turning_back():
 def guided(eyes):
     """A guide on one of two roads that are alike, 18 m before their ends."""
     guide = guide_on(twins())
-    drive(lambda d, t, eyes: guide.step(d, t, eyes, None, True), eyes, (20.0, 0.0, 0.0), LEFT)
+    drive(lambda d, t, eyes: guide.step(d, t, eyes, None, None), eyes, (20.0, 0.0, 0.0), LEFT)
     return guide
 
 
@@ -208,12 +208,12 @@ def test_a_stop_line_that_is_seen_holds_the_vehicle_where_no_hypothesis_has_one(
     free, taken = Radar(), Radar(way_is_free=False)
     assert guide.command(taken, 5.0).acceleration_mps2 == guide.command(free, 5.0).acceleration_mps2
     eyes.reading = RoadReading(end_m=9.0, end_variance_m2=0.1, end=LaneEnd.STOP_LINE)
-    guide.step(0.1, 0.0, eyes, None, True)
+    guide.step(0.1, 0.0, eyes, None, None)
     assert guide.command(taken, 5.0).acceleration_mps2 < -1.0 and guide.command(taken, 5.0).reason == "gives way"
     assert guide.command(free, 5.0).acceleration_mps2 > -1.0
-    guide.step(12.0, 0.0, eyes, None, True)  # passed, and no more seen
+    guide.step(12.0, 0.0, eyes, None, None)  # passed, and no more seen
     eyes.reading = None
-    guide.step(0.1, 0.0, eyes, None, True)
+    guide.step(0.1, 0.0, eyes, None, None)
 
 
 @pytest.mark.parametrize("sees", [True, False])
@@ -224,9 +224,35 @@ def test_where_all_places_fit_badly_it_creeps_on_road_that_it_sees_and_nowhere_e
     guide.whereabouts.fits = 0.8
     if not sees:
         eyes.kinds_at = lambda points_m: np.zeros(len(points_m), dtype=np.uint8)
-    guide.step(1.1, 0.0, eyes, None, True)
+    guide.step(1.1, 0.0, eyes, None, None)
     guide.whereabouts.fits = 0.8
     command = guide.command(Radar(), 3.0)
     assert (command is not None) is sees
     if sees:
         assert command.reason == GUESS and command.acceleration_mps2 < 0.0
+
+
+def test_a_recognised_view_that_no_hypothesis_has_becomes_one():
+    network = bends((0.0, 0.0, 1), (0.0, 300.0, 1))
+    where, eyes = Whereabouts(road_geometry(network)), Eyes(network)
+    drive(stepping(where), eyes, (5.0, 0.0, 0.0), [(20.0, 0.0)])
+    where._rows[: where.count, 1] += 1000.0  # all are elsewhere
+    assert where.about(eyes.pose, 5.0)[0] == 0.0
+    drive(lambda d, t, seen: where.step(d, t, seen, 0.05, seen.pose.copy()), eyes, eyes.pose, [(8.0, 0.0)])
+    assert where.about(eyes.pose, 5.0)[0] > 0.9
+
+
+def test_ground_that_is_misread_does_not_make_the_pose_that_is_steered_by_forgotten():
+    network = bends((0.0, 0.0, 1), (0.0, 300.0, 1))
+    for held in (False, True):
+        where, eyes = Whereabouts(road_geometry(network)), Eyes(network)
+        drive(stepping(where), eyes, (5.0, 0.0, 0.0), [(20.0, 0.0)])
+        there = eyes.pose.copy()
+        eyes.kinds_at = lambda points_m: (1 + np.arange(len(points_m)) % 2).astype(np.uint8)  # noise
+        for _ in range(200):
+            where.step(0.1, 0.0, eyes, 0.05, None, there if held else None)
+            there[0] += 0.1
+            if where.restarts:
+                break
+        share = where.about(there, 5.0)[0]
+        assert where.restarts == 1 and (share > 0.45 if held else share < 0.2)

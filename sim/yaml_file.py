@@ -116,6 +116,8 @@ def _require_value(loader: yaml.SafeLoader, node: yaml.ScalarNode, place: str) -
     """Raise ScenarioError, with the line, if a value cannot be made of what is written: there is no 2001-99-99."""
     if node.tag == MERGE:
         return
+    if "\0" in node.value:
+        raise ScenarioError(f"{place}:{node.start_mark.line + 1}: a zero byte, which no name of a file may have; take it out")
     try:
         loader.construct_object(node)
     except yaml.YAMLError:

@@ -55,3 +55,8 @@ def test_a_missing_and_a_huge_file_are_refused(tmp_path):
     (tmp_path / "huge.yaml").write_bytes(b"#" * (2 << 20))
     with pytest.raises(ScenarioError, match="at most 1 MiB"):
         load_yaml(tmp_path / "huge.yaml", Outer)
+
+
+def test_a_name_that_no_file_can_have_is_refused(tmp_path):
+    with pytest.raises(ScenarioError, match=r"a.yaml:2: a zero byte"):
+        load(tmp_path, 'inner: {size: 3}\nname: "a\\0b"\n')

@@ -66,6 +66,8 @@ def read_values(path: Path, text: str) -> Any:
 
 def inside(folder: Path, name: str, listed_in: Path) -> Path:
     """The file ``name`` in ``folder``. Raises ExchangeError if the name, read from the list ``listed_in``, leads out of it."""
+    if "\0" in name:
+        raise ExchangeError(f"{listed_in}: a file's name has a zero byte in it; the list is damaged")
     if Path(name).is_absolute() or ".." in Path(name).parts:
         raise ExchangeError(f"{listed_in}: '{name}' lies outside of the folder")
     return folder / name

@@ -171,6 +171,7 @@ def damage(path, text):
         (lambda seq: damage(seq / "rgb.txt", "soon rgb/0.png\n"), "rgb.txt: line 1: not a time and a file name"),
         (lambda seq: damage(seq / "rgb.txt", "nan rgb/0.png\n"), "rgb.txt: line 1: the time is not finite"),
         (lambda seq: damage(seq / "rgb.txt", "0.2 ../../etc/passwd\n"), "lies outside of the folder"),
+        (lambda seq: damage(seq / "rgb.txt", "0.2 rgb/0\0.png\n"), "rgb.txt: a file's name has a zero byte in it"),
         (lambda seq: damage(seq / "rgb.txt", "0.2 rgb/none.png\n"), "none.png: cannot be read"),
         (lambda seq: damage(seq / "rgb.txt", "900.2 rgb/0.200000.png\n"), "no frame within the self-motion's time"),
         (lambda seq: damage(seq / "rgb.txt", "0.4 a.png\n0.2 b.png\n"), "does not increase"),

@@ -210,6 +210,13 @@ def test_a_tub_that_leads_out_of_itself(tmp_path, capsys, name):
     assert "outside of the folder" in capsys.readouterr().err
 
 
+def test_a_tub_whose_names_no_file_can_have(tmp_path, capsys):
+    source = tub(tmp_path / "tub", records())
+    (source / "catalog_0.catalog").write_text(json.dumps({"_index": 0, "_timestamp_ms": 1, "cam/image_array": "a\0.jpg"}))
+    assert imported(source, tmp_path / "in") == BAD_INPUT
+    assert "zero byte" in capsys.readouterr().err
+
+
 def test_an_old_tub(tmp_path):
     save(tmp_path / "tub", [f"{number}_cam.jpg" for number in range(12)])
     for number in range(12):

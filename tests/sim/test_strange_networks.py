@@ -20,7 +20,7 @@ BUILDERS = {
     name: build
     for module in (strange_networks, stranger_networks)
     for name, build in inspect.getmembers(module, inspect.isfunction)
-    if build.__module__ == module.__name__ and next(iter(inspect.signature(build).parameters), "") == "folder"
+    if build.__module__ == module.__name__ and list(inspect.signature(build).parameters) == ["folder"]
 }
 DRIVEN = sorted(BUILDERS.keys() - {"converted", "osm", "never_green", "both_ways_on_one_side", "cliff"})
 

@@ -94,6 +94,7 @@ def test_notes_have_a_place_and_a_cure():
         "a.net.xml has no lanes inside junctions",
         "streets a and b cross without a junction",
         "the signals of 1 junction(s) wait for a hand",
+        "1 road(s) climb or fall by more than 25%, for instance a by 8 m over 4 m",
     )
     notes = network_notes(Scenario(name="a"), SimpleNamespace(network=town.network, notes=(*town.notes, *coincident, *others)))
     for words, cure in CURES.items():

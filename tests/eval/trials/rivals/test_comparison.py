@@ -46,7 +46,7 @@ def folder(tmp_path):
 def materials(folder):
     roads = SimpleNamespace(
         lane_count=1, lane_points_m=lambda lane: np.array([[0.0, 0.0], [50.0, 0.0]]), is_internal=np.array([False]),
-        lane_lengths_m=lambda: np.array([50.0]),
+        lane_lengths_m=lambda: np.array([50.0]), points_m=np.array([[0.0, 0.0], [50.0, 0.0]]),
     )  # fmt: skip
     mapping = SimpleNamespace(ground_truth=lambda: TRUTH)
     return SimpleNamespace(folder=folder, mapping=mapping, roads=roads, scenario=SimpleNamespace(name="ring"))

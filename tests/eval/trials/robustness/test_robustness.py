@@ -140,7 +140,7 @@ def test_a_start_without_mapped_road_is_not_judged():
 
 def test_a_condition_without_any_fix_is_a_row_all_the_same(tmp_path, capsys):
     results = [ConditionResult("same", (sequence(), sequence())), ConditionResult("night", (sequence(None, (), nees=None),) * 2)]
-    assert "| night | 0 % of 2 | - / - / - | - / - | -, - | 0 of 2 | - |" in conditions_markdown("town", results)
+    assert "| night | 0 % of 2 | - / - / - | - / - | - | - | 0 of 2 | - |" in conditions_markdown("town", results)
     report_town(tmp_path, "town", findings(*results))
     written = json.loads((tmp_path / "robustness.json").read_text())
     assert written["conditions"][1]["error_mean_m"] is None

@@ -12,6 +12,7 @@ from hippodrome.proto.arrays import Array, FieldError
 
 MOST_SECONDS = 1e11  # of a time stamp: the year 5138
 MOST_UNITS = 1e9  # of a position or a motion, in units of any length from a millimetre up; squares of it are still exact enough
+LEAST_SIGMA = 1e-12  # of a motion: its inverse square is a weight
 MOST_LOG_SCALE = 50.0  # ln of metres per unit
 MOST_METRES_READ = 1e3  # of a place or an end of a lane that was read
 MOST_END = 2  # kinds of ends of a lane
@@ -41,6 +42,7 @@ def check_map(cognitive_map: CognitiveMap) -> None:
         _require(np.abs(array) <= most, name, f"beyond {most:g}, which no vehicle does")
     _require(np.diff(cognitive_map.visits.t_s) >= 0.0, "visits.t_s", "followed by an earlier one")
     _require(edges.sigma > 0.0, "edges.sigma", "not above zero")
+    _require(edges.sigma >= LEAST_SIGMA, "edges.sigma", f"below {LEAST_SIGMA:g}, which nothing is known to")
     if cognitive_map.visits.lane is not None:
         _check_readings(cognitive_map.visits.lane)
     if cognitive_map.road_match is not None:
@@ -53,6 +55,7 @@ def _magnitudes(cognitive_map: CognitiveMap) -> Iterator[tuple[str, Array, float
     yield "visits.t_s", cognitive_map.visits.t_s, MOST_SECONDS
     yield "poses", cognitive_map.poses, MOST_UNITS
     yield "edges.motion", cognitive_map.edges.motion, MOST_UNITS
+    yield "edges.sigma", cognitive_map.edges.sigma, MOST_UNITS
     yield "visits.motion", cognitive_map.visits.motion, MOST_UNITS
     if cognitive_map.log_scale is not None:
         yield "log_scale", cognitive_map.log_scale, MOST_LOG_SCALE

@@ -61,13 +61,12 @@ def _vertex_facts(place: Place) -> list[str]:
     facts = [f"Matched{lane}." if place.status == "matched" else f"Road match: {place.status}{lane}."]
     if place.sure_m is not None:
         facts.append(f"The map says that it is 95{NBSP}% sure within {place.sure_m:.2f}{NBSP}m.")
-    if place.since_closure_m is None:
+    if place.since_closure_m is None or place.closed_with_s is None:
         facts.append("No loop had been closed before.")
-    elif place.since_closure_m == 0.0:
-        facts.append(f"A loop is closed here, with the view stored at {place.closed_with_s:.0f}{NBSP}s.")
     else:
-        facts.append(f"The last loop was closed {place.since_closure_m:.0f}{NBSP}m before, with the view stored at "
-                     f"{place.closed_with_s:.0f}{NBSP}s.")  # fmt: skip
+        is_here, far = place.since_closure_m == 0.0, f"{place.since_closure_m:.0f}{NBSP}m before"
+        closed = "A loop is closed here" if is_here else f"The last loop was closed {far}"
+        facts.append(f"{closed}, with the view stored at {place.closed_with_s:.0f}{NBSP}s.")
     if place.lanes:
         facts.append(f"Other lanes: {', '.join(f'{one.lane} ({one.apart_m:.1f}{NBSP}m away)' for one in place.lanes)}.")
     near = [f"{'no truth there' if one.error_m is None else f'{one.error_m:.2f}{NBSP}m off'} ({one.apart_m:.1f}{NBSP}m away)"

@@ -7,6 +7,7 @@ import pytest
 
 from hippodrome.core.types import EdgeKind
 from hippodrome.eval.report.evidence import Layer
+from hippodrome.eval.report.places import _vertex_facts
 from hippodrome.eval.report.why import OTHER_PASS, place_of, read_why
 from hippodrome.eval.results.model import ResultsError
 
@@ -50,6 +51,13 @@ def test_what_is_not_known_is_left_out():
     assert np.isfinite(place_of(LAYER, 35, a_map()).sure_m)
     unsure = place_of(LAYER, 35, a_map(covariance=np.full((COUNT, 3, 3), np.nan)))
     assert unsure.sure_m is None
+
+
+def test_half_of_a_closure_is_none():
+    place = place_of(LAYER, 35, a_map())
+    for unknown in ("since_closure_m", "closed_with_s"):
+        facts = _vertex_facts(place.model_copy(update={unknown: None}))
+        assert "No loop had been closed before." in facts
 
 
 def test_a_pass_is_no_neighbour_of_itself():

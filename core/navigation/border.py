@@ -23,7 +23,7 @@ LONGEST_DASH_M = 3.7  # a dash has 3 m
 GAP_CELLS = 13.0  # a border goes on where it was hidden, over twice so many cells: round a corner the car looks past it
 STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
 UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
-OTHER_SIDE_1PM = 0.12  # and more so where the other side of the road is nearest
+LANE_M = 3.2  # from the border of the other side the own lane is a lane more away than from the own one
 MOST_TURN_RAD = 1.9
 RECEDES_RAD, STRAIGHT_ON_M = 0.25, 0.2  # a border that leads away by so much is a side street's, for who goes straight on
 DECAY_M = 1.6  # distance over which an offset from the way fades
@@ -82,18 +82,21 @@ def along_border(
         d = distance_at(field, corner, CELL_M, px, py)
         gx = distance_at(field, corner, CELL_M, px + SLOPE_M, py) - distance_at(field, corner, CELL_M, px - SLOPE_M, py)
         gy = distance_at(field, corner, CELL_M, px, py + SLOPE_M) - distance_at(field, corner, CELL_M, px, py - SLOPE_M)
-        seen = d < REACH_M and gx * gx + gy * gy > 1e-6
+        seen = d < beside_m + LANE_M and gx * gx + gy * gy > 1e-6
         wanted = 0.0 if straight_on else side * UNSEEN_1PM
         if seen:
             along = math.atan2(gy, gx) + side * 0.5 * math.pi  # the border's direction, with the border on the own side
             turn = (heading - along + math.pi) % (2.0 * math.pi) - math.pi
+            seen = d < REACH_M or abs(turn) >= MOST_TURN_RAD
+        if seen:
             off = side * (beside_m - min(d, beside_m + 1.0))  # of the vehicle to the left of its line
-            if straight_on and side * turn < -RECEDES_RAD and d > beside_m - STRAIGHT_ON_M:
-                wanted = 0.0  # the border leads into a side street
-            elif abs(turn) < MOST_TURN_RAD:
+            if abs(turn) >= MOST_TURN_RAD:  # that of the other side: the lane beside it is for who comes towards the vehicle
+                off, turn = side * (d - beside_m - LANE_M), turn % (2.0 * math.pi) - math.pi
                 wanted = -off / DECAY_M**2 - 2.0 * turn / DECAY_M
-            else:  # what is nearest is the border of the other side
-                wanted = side * OTHER_SIDE_1PM
+            elif straight_on and side * turn < -RECEDES_RAD and d > beside_m - STRAIGHT_ON_M:
+                wanted = 0.0  # the border leads into a side street
+            else:
+                wanted = -off / DECAY_M**2 - 2.0 * turn / DECAY_M
         wanted = min(max(wanted, -TIGHTEST_1PM), TIGHTEST_1PM)
         bend += min(max(wanted - bend, -BEND_PER_STEP), BEND_PER_STEP)
         rows[k, 0], rows[k, 1], rows[k, 2] = x, y, heading

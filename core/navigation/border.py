@@ -19,6 +19,7 @@ AHEAD_M = 0.5  # ahead of the rear axle, where the line of equal distance from t
 SLOPE_M = 0.3  # over which the direction of the border is taken
 SPECK = np.ones((3, 3), dtype=np.uint8)  # fewer cells than that are no border, but the rim of a painted line
 BESIDE = np.ones((5, 5), dtype=np.uint8)  # an edge line lies within two cells of what is no road
+LINE_INSIDE_M = 0.2  # of the kerb an edge line is painted, at least: .25 m in lanes of 3.2 m, less half a line of .12 m
 LONGEST_DASH_M = 3.7  # a dash has 3 m
 GAP_CELLS = 13.0  # a border goes on where it was hidden, over twice so many cells: round a corner the car looks past it
 STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
@@ -51,6 +52,19 @@ def borders(part: UInt8Array) -> UInt8Array:
     near = (cv2.distanceTransform(1 - found, cv2.DIST_L2, 5) <= GAP_CELLS).astype(np.uint8)
     closed = (cv2.distanceTransform(near, cv2.DIST_L2, 5) > GAP_CELLS) & (seen_ground(part) == 0)
     return np.asarray(found | closed.astype(np.uint8), dtype=np.uint8)
+
+
+def room_fields(part: UInt8Array) -> tuple[FloatArray, FloatArray]:
+    """Of cells (n, m), the distance to the nearest border, and the room that the car has there.
+
+    A line at the edge is painted beside the kerb, so that the car has more room than up to the line.
+    """
+    found = borders(part)
+    line_m, kerb_m = (
+        CELL_M * cv2.distanceTransform((free > 0).astype(np.uint8), cv2.DIST_L2, 5).astype(np.float64)
+        for free in (found == 0, (found == 0) | (part == PAINT))
+    )
+    return line_m, np.minimum(kerb_m, line_m + LINE_INSIDE_M)
 
 
 def seen_ground(part: UInt8Array) -> UInt8Array:

@@ -6,7 +6,17 @@ import cv2
 import numpy as np
 import pytest
 
-from hippodrome.core.navigation.border import LANE_M, OTHER, PAINT, ROAD, UNKNOWN, along_border, borders
+from hippodrome.core.navigation.border import (
+    LANE_M,
+    LINE_INSIDE_M,
+    OTHER,
+    PAINT,
+    ROAD,
+    UNKNOWN,
+    along_border,
+    borders,
+    room_fields,
+)
 from hippodrome.core.navigation.sight import Ground
 from hippodrome.core.navigation.sweep import STEP_M, STEPS, drivable
 from hippodrome.core.views.config import CameraGeometry
@@ -48,6 +58,17 @@ def test_edge_lines_are_borders_and_dashes_and_stop_lines_are_none():
     found = borders(part)
     assert found[:, 20].all() and found[40:50, 52].all() and found[:, 60].all()
     assert not found[:, 30:50].any() and not found[101, 25:35].any()
+
+
+def test_beside_a_painted_edge_there_is_more_room_than_beside_a_kerb():
+    part = cells()
+    part[:, 40] = PAINT
+    part[:, 42:] = OTHER
+    line_m, room_m = room_fields(part)
+    assert room_m[80, 30] == pytest.approx(line_m[80, 30] + LINE_INSIDE_M)
+    part[:, 40] = ROAD
+    line_m, room_m = room_fields(part)
+    assert np.array_equal(line_m, room_m)
 
 
 def test_a_border_goes_on_where_it_was_hidden():

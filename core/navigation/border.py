@@ -19,11 +19,12 @@ AHEAD_M = 0.5  # ahead of the rear axle, where the line of equal distance from t
 SLOPE_M = 0.3  # over which the direction of the border is taken
 SPECK = np.ones((3, 3), dtype=np.uint8)  # fewer cells than that are no border, but the rim of a painted line
 BESIDE = np.ones((5, 5), dtype=np.uint8)  # an edge line lies within two cells of what is no road
+LINE_INSIDE_M = 0.2  # of the kerb an edge line is painted, at least: .25 m in lanes of 3.2 m, less half a line of .12 m
 LONGEST_DASH_M = 3.7  # a dash has 3 m
 GAP_CELLS = 13.0  # a border goes on where it was hidden, over twice so many cells: round a corner the car looks past it
 STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
 UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
-OTHER_SIDE_1PM = 0.12  # and more so where the other side of the road is nearest
+LANE_M = 3.2  # from the border of the other side the own lane is a lane more away than from the own one
 MOST_TURN_RAD = 1.9
 RECEDES_RAD, STRAIGHT_ON_M = 0.25, 0.2  # a border that leads away by so much is a side street's, for who goes straight on
 DECAY_M = 1.6  # distance over which an offset from the way fades
@@ -51,6 +52,19 @@ def borders(part: UInt8Array) -> UInt8Array:
     near = (cv2.distanceTransform(1 - found, cv2.DIST_L2, 5) <= GAP_CELLS).astype(np.uint8)
     closed = (cv2.distanceTransform(near, cv2.DIST_L2, 5) > GAP_CELLS) & (seen_ground(part) == 0)
     return np.asarray(found | closed.astype(np.uint8), dtype=np.uint8)
+
+
+def room_fields(part: UInt8Array) -> tuple[FloatArray, FloatArray]:
+    """Of cells (n, m), the distance to the nearest border, and the room that the car has there.
+
+    A line at the edge is painted beside the kerb, so that the car has more room than up to the line.
+    """
+    found = borders(part)
+    line_m, kerb_m = (
+        CELL_M * cv2.distanceTransform((free > 0).astype(np.uint8), cv2.DIST_L2, 5).astype(np.float64)
+        for free in (found == 0, (found == 0) | (part == PAINT))
+    )
+    return line_m, np.minimum(kerb_m, line_m + LINE_INSIDE_M)
 
 
 def seen_ground(part: UInt8Array) -> UInt8Array:
@@ -82,18 +96,21 @@ def along_border(
         d = distance_at(field, corner, CELL_M, px, py)
         gx = distance_at(field, corner, CELL_M, px + SLOPE_M, py) - distance_at(field, corner, CELL_M, px - SLOPE_M, py)
         gy = distance_at(field, corner, CELL_M, px, py + SLOPE_M) - distance_at(field, corner, CELL_M, px, py - SLOPE_M)
-        seen = d < REACH_M and gx * gx + gy * gy > 1e-6
+        seen = d < beside_m + LANE_M and gx * gx + gy * gy > 1e-6
         wanted = 0.0 if straight_on else side * UNSEEN_1PM
         if seen:
             along = math.atan2(gy, gx) + side * 0.5 * math.pi  # the border's direction, with the border on the own side
             turn = (heading - along + math.pi) % (2.0 * math.pi) - math.pi
+            seen = d < REACH_M or abs(turn) >= MOST_TURN_RAD
+        if seen:
             off = side * (beside_m - min(d, beside_m + 1.0))  # of the vehicle to the left of its line
-            if straight_on and side * turn < -RECEDES_RAD and d > beside_m - STRAIGHT_ON_M:
-                wanted = 0.0  # the border leads into a side street
-            elif abs(turn) < MOST_TURN_RAD:
+            if abs(turn) >= MOST_TURN_RAD:  # that of the other side: the lane beside it is for who comes towards the vehicle
+                off, turn = side * (d - beside_m - LANE_M), turn % (2.0 * math.pi) - math.pi
                 wanted = -off / DECAY_M**2 - 2.0 * turn / DECAY_M
-            else:  # what is nearest is the border of the other side
-                wanted = side * OTHER_SIDE_1PM
+            elif straight_on and side * turn < -RECEDES_RAD and d > beside_m - STRAIGHT_ON_M:
+                wanted = 0.0  # the border leads into a side street
+            else:
+                wanted = -off / DECAY_M**2 - 2.0 * turn / DECAY_M
         wanted = min(max(wanted, -TIGHTEST_1PM), TIGHTEST_1PM)
         bend += min(max(wanted - bend, -BEND_PER_STEP), BEND_PER_STEP)
         rows[k, 0], rows[k, 1], rows[k, 2] = x, y, heading

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -27,7 +26,7 @@ from hippodrome.core.navigation.border import (
     STEP_M,
     UNKNOWN,
     along_border,
-    borders,
+    room_fields,
     seen_ground,
 )
 from hippodrome.core.navigation.sweep import drivable
@@ -178,11 +177,11 @@ class Ground:
             self._begin_border(side)
         part, corner_m = self.around(AROUND_M)
         seen = seen_ground(part)
-        field = CELL_M * cv2.distanceTransform(1 - borders(part), cv2.DIST_L2, 5).astype(np.float64)
+        field, room = room_fields(part)
         line = along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
         bends = sorted(STANDING_BENDS_1PM, key=lambda one: abs(one - bend_1pm)) if stands else [bend_1pm]
         tried = [
-            drivable(field, seen, corner_m, CELL_M, self.pose, one, np.ascontiguousarray(line[:, :3]), need_m) for one in bends
+            drivable(room, seen, corner_m, CELL_M, self.pose, one, np.ascontiguousarray(line[:, :3]), need_m) for one in bends
         ]
         rows = max(tried, key=len)
         free_m = sweep.STEP_M * len(rows) if len(rows) < sweep.STEPS else math.inf

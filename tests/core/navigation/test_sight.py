@@ -6,7 +6,17 @@ import cv2
 import numpy as np
 import pytest
 
-from hippodrome.core.navigation.border import OTHER, PAINT, ROAD, UNKNOWN, borders
+from hippodrome.core.navigation.border import (
+    LANE_M,
+    LINE_INSIDE_M,
+    OTHER,
+    PAINT,
+    ROAD,
+    UNKNOWN,
+    along_border,
+    borders,
+    room_fields,
+)
 from hippodrome.core.navigation.sight import Ground
 from hippodrome.core.navigation.sweep import STEP_M, STEPS, drivable
 from hippodrome.core.views.config import CameraGeometry
@@ -50,6 +60,17 @@ def test_edge_lines_are_borders_and_dashes_and_stop_lines_are_none():
     assert not found[:, 30:50].any() and not found[101, 25:35].any()
 
 
+def test_beside_a_painted_edge_there_is_more_room_than_beside_a_kerb():
+    part = cells()
+    part[:, 40] = PAINT
+    part[:, 42:] = OTHER
+    line_m, room_m = room_fields(part)
+    assert room_m[80, 30] == pytest.approx(line_m[80, 30] + LINE_INSIDE_M)
+    part[:, 40] = ROAD
+    line_m, room_m = room_fields(part)
+    assert np.array_equal(line_m, room_m)
+
+
 def test_a_border_goes_on_where_it_was_hidden():
     part = cells()
     part[:, 40] = PAINT
@@ -89,6 +110,19 @@ def test_round_a_corner_without_a_radius_no_wheel_leaves_the_road(side):
         near = np.argmin(np.hypot(*(line[:, :2] - pose[:2]).T))
         line = line[near:]
     assert abs(pose[2] - side * 0.5 * math.pi) < 0.35
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("far_m", "straight_on"), [(1.6, False), (2.8, False), (3.6, False), (2.8, True)])
+def test_where_only_the_border_of_the_other_side_is_seen_the_line_leads_to_the_own_lane(side, far_m, straight_on):
+    barrier = np.zeros((160, 160), dtype=np.uint8)
+    border = 80
+    barrier[:, slice(border, None) if side < 0.0 else slice(0, border)] = 1
+    pose = np.array([4.0, border * CELL_M + side * far_m, 0.0])
+    rows = along_border(field_of(barrier), CORNER, pose, 0.0, side, 1.35, straight_on, 56)
+    apart_m = side * (rows[:, 1] - border * CELL_M)
+    assert rows[0, 3] == 1.0 and np.all(np.diff(apart_m) > -1e-6)
+    assert apart_m[-1] == pytest.approx(LANE_M + 1.35, abs=0.4)
 
 
 def test_before_a_wall_the_way_ends():

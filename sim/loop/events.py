@@ -11,6 +11,7 @@ from hippodrome.sim.loop.crossing import Crossing
 from hippodrome.sim.loop.moment import Moment, event
 from hippodrome.sim.loop.rights import Rights
 from hippodrome.sim.loop.types import Event, EventKind
+from hippodrome.sim.loop.ways import Ways
 
 TOLERANCE_M: Final = 0.05  # a tyre on the line is in the lane
 OVER_S: Final = 1.0  # what has not been seen for so long is over, and would be a new event
@@ -38,12 +39,12 @@ class Watch:
     for a second is over; if it comes again, it is a new event.
     """
 
-    def __init__(self, rights: Rights) -> None:
+    def __init__(self, rights: Rights, ways: Ways) -> None:
         self._rights = rights
         self._last_s: dict[str, float] = {}  # when each condition was last seen
         self._against_since_s = math.inf
         self._steady_since_s = 0.0
-        self._crossing = Crossing(rights)
+        self._crossing = Crossing(rights, ways)
 
     def look(self, m: Moment) -> tuple[Event, ...]:
         """The events that begin in this step."""

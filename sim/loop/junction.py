@@ -20,7 +20,8 @@ PATIENCE_S: Final = 5.0  # whoever stands so long at the junction, though he mig
 MARGIN_S: Final = 1.0  # between the ego's rear and the next vehicle
 FOE_ACCEL_MPS2: Final = 1.0  # others may become this much faster on their way
 OWN_ACCEL_MPS2: Final = 1.5  # with which the ego is taken to drive through
-STRAIGHT_MPS, BEND_MPS = 8.0, 4.5  # and the speeds at which it is taken to do so
+STRAIGHT_MPS, BEND_MPS = 8.0, 4.5  # and the highest speeds at which it is taken to do so
+BEND_RADPS: Final = 0.4  # a bend is driven so slowly that the wheels can follow: a right angle in four seconds
 BEND_RAD: Final = math.radians(35.0)
 STANDS_MPS: Final = 0.3
 
@@ -144,7 +145,9 @@ class Entry:
 
     def clear_s(self) -> float:
         """Until the rear has left it."""
-        top = BEND_MPS if abs(self.turn_rad) > BEND_RAD else STRAIGHT_MPS
+        top = STRAIGHT_MPS
+        if abs(self.turn_rad) > BEND_RAD:
+            top = min(BEND_MPS, BEND_RADPS * self.way_m / abs(self.turn_rad))
         return _drive_s(max(self.line_m, 0.0) + self.way_m + LENGTH_M, self.speed_mps, top)
 
 

@@ -134,7 +134,7 @@ class World:
         vans = bar(self.network, self._closed)
         traffic = self._drive.traffic.model_copy(update={"vehicles": self._drive.traffic.vehicles + vans})
         self._others = BackgroundTraffic(traffic, self.network, self._graph, self._area, rng_traffic, climbs)
-        self._watch = Watch(self._rights)
+        self._watch = Watch(self._rights, self.ways)
         self._onlooker, self._puppet = Onlooker(climbs), Puppet(self.network, self.ways)
         self._odometry = Odometry(self.scenario.self_motion_noise, self._rng_odometry)
         for step in range(round(WARM_UP_S / STEP_S)):

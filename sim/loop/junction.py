@@ -21,7 +21,7 @@ MARGIN_S: Final = 1.0  # between the ego's rear and the next vehicle
 FOE_ACCEL_MPS2: Final = 1.0  # others may become this much faster on their way
 OWN_ACCEL_MPS2: Final = 1.5  # with which the ego is taken to drive through
 STRAIGHT_MPS, BEND_MPS = 8.0, 4.5  # and the highest speeds at which it is taken to do so
-BEND_RADPS: Final = 0.4  # a bend is driven so slowly that the wheels can follow: a right angle in four seconds
+BEND_RADPS: Final = 0.5  # at which a bend is turned at most: a right angle takes three seconds
 BEND_RAD: Final = math.radians(35.0)
 STANDS_MPS: Final = 0.3
 

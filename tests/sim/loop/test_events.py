@@ -1,6 +1,8 @@
 """What is detected and logged: collisions and who is to blame, the wrong way, red signals, rights of way."""
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import libsumo
 import numpy as np
@@ -8,6 +10,8 @@ import pytest
 
 from hippodrome.core.navigation.types import Indicator, Lamp
 from hippodrome.core.types import HippodromeError
+from hippodrome.sim.loop.crossing import Crossing
+from hippodrome.sim.loop.junction import Comer, Entry
 from hippodrome.sim.loop.radar import nearest_ahead
 from hippodrome.sim.loop.types import EventKind, LanePlace
 from hippodrome.sim.loop.users import Users
@@ -113,6 +117,33 @@ def test_who_waits_until_the_way_is_free_takes_nothing(world):
         found.extend(sensed.events)
     assert found == []
     assert sensed.truth.lane_id in ("c-n_0", "n-c_0")
+
+
+def test_the_way_is_free_for_as_long_as_a_sharp_bend_takes():
+    gentle = Entry(0, 2.0, 13.0, 0.5 * math.pi, 0.0, "")
+    sharp = Entry(0, 2.0, 13.0, 0.7 * math.pi, 0.0, "")
+    straight = Entry(0, 2.0, 13.0, 0.0, 0.0, "")
+    assert straight.clear_s() < gentle.clear_s() < sharp.clear_s()
+    assert sharp.clear_s() == pytest.approx(20.0 / (0.5 * 13.0 / (0.7 * math.pi)), abs=1.0)
+
+
+@pytest.mark.parametrize(("indicator", "after", "taken"), [(Indicator.RIGHT, "c-e_0", 0), (Indicator.STRAIGHT, "c-n_0", 1)])
+def test_who_swings_wide_into_a_right_turn_is_judged_by_the_turn(world, indicator, after, taken):
+    """Its front is where the way straight on lies for some metres, which would have had to let the other pass."""
+    lane_of = {name: lane for lane, name in enumerate(world.network.lane_ids)}
+    before = lane_of["s-c_0"]
+    right, straight = (world.ways.meant(before, one).inside[0] for one in (Indicator.RIGHT, Indicator.STRAIGHT))
+    other = world.ways.meant(lane_of["e-c_0"], Indicator.STRAIGHT).inside[0]
+    comer = Comer("b904", 0, other, 8.0, 30.0, 8.0, held=False, waiting_s=0.0)
+    start = world.reset(1).truth
+    watched, found = Crossing(world._rights, world.ways), []
+    inner = right if indicator is Indicator.RIGHT else straight
+    for k, front in enumerate((before, straight, straight, inner, lane_of[after], lane_of[after])):
+        truth = replace(start, t_s=0.1 * k, in_junction=2 <= k < 5, indicator=indicator)
+        users = Users(("b904",), np.array([1]), np.array([0], np.uint8), np.zeros((1, 3)), np.array([8.0 - 0.5 * k]))
+        moment = SimpleNamespace(truth=truth, users=users, front_lane=front, signals={}, coming=[comer])
+        found.extend(watched.look(moment))
+    assert [(event.kind, event.other) for event in found] == taken * [(EventKind.RIGHT_OF_WAY, "b904")]
 
 
 def test_a_red_light_run_is_seen_and_a_green_one_is_none(signals_town):

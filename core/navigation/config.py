@@ -16,6 +16,7 @@ class VehicleShape:
     half_track_m: float = 0.8  # from the middle to the outer face of a tyre
     front_m: float = 3.6  # from the rear axle to the front bumper
     max_steering_rad: float = 0.733  # of the road wheels: 42 degrees
+    steering_rate_radps: float = 0.9  # at which they are turned at most
     max_acceleration_mps2: float = 4.0
     max_braking_mps2: float = 8.0
 
@@ -56,7 +57,7 @@ class DriveConfig:
     creep_mps: float = 1.2
     error_decay_m: float = 3.0  # distance over which an offset from the path fades at low speed
     error_decay_s: float = 0.6  # and the time it takes at least
-    preview_s: float = 0.2  # steering looks ahead by about its own delay
+    preview_s: float = 0.15  # steering looks ahead by about its own delay
     speed_gain_1ps: float = 1.5
     headway_s: float = 1.4  # of the intelligent driver model (Treiber, Hennecke and Helbing, 2000)
     jam_gap_m: float = 2.5  # and its gap at rest

@@ -23,15 +23,17 @@ from hippodrome.core.se2 import wrap
 from hippodrome.core.types import FloatArray
 
 TURNS_RAD: Final = (math.radians(35.0), math.radians(150.0))  # straighter ways need no help, and turning round has no room
-OUTWARD_M: Final = (-0.2, 0.0, 0.2, 0.4, 0.6, 0.8)  # offsets that are tried, away from the inside of the turn
+OUTWARD_M: Final = (-0.2, 0.0, 0.2, 0.4, 0.6)  # offsets that are tried, away from the inside of the turn
 CURVATURES_1PM: Final = (0.18, 0.22, 0.26, 0.30, 0.32)  # and curvatures; full lock is .33, the rest is for corrections
-SLOPE_1PM2: Final = 0.2  # at 1.6 m/s that turns the road wheels by .85 rad/s: they manage .9
+RAMP_M: Final = 1.6  # the curvature rises over it: at .5 rad/s round the bend the wheels turn by .85 rad/s, and manage .9
 FINE_M: Final = 0.1  # integration of the bend
-MARGIN_M: Final = 0.15  # wheels are to keep so far from the edges
+MARGIN_M: Final = 0.25  # of the wheels from the edges: .3 m of error along the way are .2 m sideways in mid-turn
 SWING_M: Final = 9.0  # length over which an offset is taken up: .6 m in it are a bend of 22 m radius
 LEAST_SWING_M: Final = 5.0
 STRAIGHT_M: Final = 0.15  # a lane that leaves its last direction by more within the bend is no straight one
 SEEN_M: Final = 20.0  # of the lanes before and after
+FINER_M: Final = (-0.1, 0.0, 0.1)  # the best offsets are looked for again so near to those found
+WORST_M: Final = 3.0  # the worst place counts as if it were so long: a kerb is short, and is a kerb
 OFFSET_COST: Final = 2e-3  # per square metre: of two ways that keep clear the straighter one
 
 
@@ -162,13 +164,21 @@ def best_corner(network: RoadNetwork, lanes: tuple[int, ...], vehicle: VehicleSh
         return None
     edges, best = _edges(network, lanes), None
     outward = -math.copysign(1.0, turn_rad)
-    for curvature, first, second in product(CURVATURES_1PM, OUTWARD_M, OUTWARD_M):
-        corner = _corner(begin, end, turn_rad, curvature, (outward * first, outward * second))
+
+    def better(best: Corner | None, curvature_1pm: float, first_m: float, second_m: float) -> Corner | None:
+        """The corner with these offsets, outward positive, if it is the better one; else the best one so far."""
+        corner = _corner(begin, end, turn_rad, curvature_1pm, (outward * first_m, outward * second_m))
         if corner is None or not _fits(network, lanes, corner):
-            continue
-        cost = _cost(corner.bend[:, :3], edges, vehicle) + OFFSET_COST * (first**2 + second**2)
-        if best is None or cost < best.cost:
-            best = replace(corner, cost=cost)
+            return best
+        cost = _cost(corner.bend[:, :3], edges, vehicle) + OFFSET_COST * (first_m**2 + second_m**2)
+        return replace(corner, cost=cost) if best is None or cost < best.cost else best
+
+    for curvature, first, second in product(CURVATURES_1PM, OUTWARD_M, OUTWARD_M):
+        best = better(best, curvature, first, second)
+    if best is not None:
+        first, second = (outward * offset for offset in best.offsets_m)
+        for curvature, more, further in product(CURVATURES_1PM, FINER_M, FINER_M):
+            best = better(best, curvature, first + more, second + further)
     return best
 
 
@@ -176,7 +186,7 @@ def _corner(
     begin: FloatArray, end: FloatArray, turn_rad: float, curvature_1pm: float, offsets_m: tuple[float, float]
 ) -> Corner | None:
     """The bend from the line of the lane before to that of the lane after, each at its offset."""
-    ramp_m = curvature_1pm / SLOPE_1PM2
+    ramp_m = RAMP_M
     hold_m = abs(turn_rad) / curvature_1pm - ramp_m
     if hold_m < 0.0:
         return None
@@ -210,7 +220,7 @@ def _fits(network: RoadNetwork, lanes: tuple[int, ...], corner: Corner) -> bool:
 
 
 def _cost(poses: FloatArray, edges: FloatArray, vehicle: VehicleShape) -> float:
-    """How far (n, 3) poses' wheels come beyond the edges less the margin, squared and summed over the way [m^3]."""
+    """How far (n, 3) poses' wheels come beyond the edges less the margin, squared, summed over the way [m^3], and at worst."""
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     wheels = np.concatenate([
         np.stack([poses[:, 0] + ahead * cos - aside * sin, poses[:, 1] + ahead * sin + aside * cos], axis=1)
@@ -223,7 +233,7 @@ def _cost(poses: FloatArray, edges: FloatArray, vehicle: VehicleShape) -> float:
     distance = np.linalg.norm(apart - share[:, :, None] * step, axis=2)
     beyond = np.maximum((distance - half_m).min(axis=1) + MARGIN_M, 0.0)
     spacing = float(np.mean(np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1)))
-    return float(np.sum(beyond**2)) * spacing
+    return float(np.sum(beyond**2)) * spacing + WORST_M * float(beyond.max(initial=0.0)) ** 2
 
 
 def _edges(network: RoadNetwork, lanes: tuple[int, ...]) -> FloatArray:

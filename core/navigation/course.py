@@ -17,6 +17,8 @@ from hippodrome.core.types import FloatArray, IntArray
 
 INDICATED_RAD = math.radians(30.0)  # a way through a junction that turns more is indicated
 SEARCH_BEHIND_M, SEARCH_AHEAD_M = 6.0, 10.0  # where the place on the path is looked for, about the last one
+STEERING_SHARE = 0.9  # of the rate at which the wheels turn: the rest is for corrections
+WHEELS_OVER_M = 1.0  # a step in a path's curvature is taken as one over this way, about where the wheels can be early and late
 TURN_IN_M = 1.2  # before a bend the wheels begin to turn: with it most sharp corners are driven within the lanes
 
 
@@ -69,7 +71,7 @@ def make_course(
         path=path,
         lane=lanes[owner],
         position_m=begin_m[owner] + u - starts[owner],
-        speed_mps=_comfortable_mps(path, limit_mps, config),
+        speed_mps=_comfortable_mps(path, limit_mps, config, vehicle),
         gates=_gates(network, path, lanes, starts),
         goal_u_m=float(starts[last] + goal_m - pieces[last].begin_m),
         changes_u_m=tuple(float(starts[k]) for k in sides),
@@ -77,15 +79,29 @@ def make_course(
     )
 
 
-def _comfortable_mps(path: Path, limit_mps: FloatArray, config: DriveConfig) -> FloatArray:
-    """The highest speed (n,) along a path: v^2 kappa <= a_lateral, v kappa <= the yaw rate, and braking in time for the rest."""
+def _comfortable_mps(path: Path, limit_mps: FloatArray, config: DriveConfig, vehicle: VehicleShape) -> FloatArray:
+    """The highest speed (n,) along a path, with braking in time for what is to come.
+
+    v^2 kappa <= a_lateral, v kappa <= the yaw rate, and v d delta/ds <= the rate at which the wheels, at the angle delta, turn.
+    """
     bend = np.maximum(np.abs(path.curvature_1pm), 1e-6)
     bends_mps = np.minimum(np.sqrt(config.lateral_mps2 / bend), config.yaw_rate_radps / bend)
+    bends_mps = np.minimum(bends_mps, STEERING_SHARE * vehicle.steering_rate_radps / _wheels_radpm(path, vehicle))
     allowed = np.minimum(limit_mps, np.maximum(bends_mps, config.creep_mps))
     braking = 2.0 * config.braking_mps2 * STEP_M * np.arange(len(allowed))
     latest = np.minimum.accumulate((allowed**2 + braking)[::-1])[::-1]  # v(i)^2 <= v(j)^2 + 2 b (u_j - u_i) for all j >= i
     speed: FloatArray = np.sqrt(latest - braking)
     return speed
+
+
+def _wheels_radpm(path: Path, vehicle: VehicleShape) -> FloatArray:
+    """By how much (n,) the road wheels turn per metre along a path, over ``WHEELS_OVER_M``; at least a little."""
+    wheels = np.arctan(vehicle.wheelbase_m * path.curvature_1pm)
+    half = round(0.5 * WHEELS_OVER_M / STEP_M)
+    rows = np.arange(len(wheels))
+    after, before = np.minimum(rows + half, len(rows) - 1), np.maximum(rows - half, 0)
+    rate: FloatArray = np.abs(wheels[after] - wheels[before]) / (2 * half * STEP_M)
+    return np.maximum(rate, 1e-6)
 
 
 def _gates(network: RoadNetwork, path: Path, lanes: IntArray, starts: FloatArray) -> tuple[Gate, ...]:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from hippodrome.core.navigation.config import DriveConfig, VehicleShape
 from hippodrome.core.navigation.course import Course, Gate, at, next_gate
-from hippodrome.core.navigation.junctions import SIGHT_M, gate_speed_mps, is_barred
+from hippodrome.core.navigation.junctions import SIGHT_M, gate_speed_mps, is_barred, room_to_stop_m
 from hippodrome.core.navigation.speed import stopping_mps
 from hippodrome.core.navigation.types import Indicator, Radar
 
-LOOK_S = 0.4  # braking begins so early: the speed follows the wanted one with a lag
+LOOK_S = 0.6  # braking begins so early: the speed follows the wanted one with a lag of 1 / speed_gain, .67 s
 GOAL_BRAKING_MPS2 = 1.2  # gentle, since the last metre counts
 CHANGE_INDICATED_M = 25.0  # before a lane change
 BARRED = "waits: somebody stands beyond the junction"
@@ -44,7 +44,7 @@ def pace(
     along_sigma_m: float = 0.0,
 ) -> Pace:
     """The speed at the place ``u_m`` of a course whose position is known to ``sigma_m``, and along it to ``along_sigma_m``."""
-    wanted, reason = at(course.speed_mps, u_m + LOOK_S * speed_mps), ""
+    wanted, reason = min(at(course.speed_mps, u_m), at(course.speed_mps, u_m + LOOK_S * speed_mps)), ""
     if sigma_m > config.unsure_m:
         unsure = max(wanted * config.unsure_m / sigma_m, min(wanted, SLOWEST_MPS))
         wanted, reason = unsure, "slows down: the place is not known well"
@@ -65,7 +65,7 @@ def pace(
         slowed, why = gate_speed_mps(to_stop_m, speed_mps, radar, config)
         if gate.indicator is Indicator.STRAIGHT and is_barred(to_stop_m, speed_mps, radar):
             slowed, why = stopping_mps(to_stop_m, config.braking_mps2), BARRED
-        stop_m = min(stop_m, to_stop_m) if math.isfinite(slowed) else stop_m
+        stop_m = min(stop_m, room_to_stop_m(to_stop_m)) if math.isfinite(slowed) else stop_m
         if slowed < wanted:
             wanted, reason = slowed, why
     if indicator is Indicator.STRAIGHT:

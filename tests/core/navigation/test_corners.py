@@ -7,6 +7,7 @@ import pytest
 
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.corners import best_corner, with_corners
+from hippodrome.core.navigation.course import make_course
 from hippodrome.core.navigation.navigator import Navigator
 from hippodrome.core.navigation.types import DrivingState, Goal
 from hippodrome.core.roads.paths import Piece, smooth_path
@@ -30,7 +31,7 @@ def pieces_of(network):
     return [Piece(lane, 0.0, float(network.lane_lengths_m()[lane]), False, 5.0) for lane in range(network.lane_count)]
 
 
-def outside_m(network, poses):
+def outside_m(network, poses, half_width_m=HALF_WIDTH_M):
     """How far the worst wheel is beyond the lanes."""
     lines = np.concatenate([network.lane_points_m(lane) for lane in range(network.lane_count)])
     a, step = lines[:-1], np.diff(lines, axis=0)
@@ -42,7 +43,7 @@ def outside_m(network, poses):
                                   y + ahead * math.sin(heading) + aside * math.cos(heading)])  # fmt: skip
                 share = np.clip(np.sum((wheel - a) * step, axis=1) / np.maximum(np.sum(step**2, axis=1), 1e-9), 0.0, 1.0)
                 apart = np.hypot(*(wheel - a - share[:, None] * step).T).min()
-                worst = max(worst, float(apart) - HALF_WIDTH_M)
+                worst = max(worst, float(apart) - half_width_m)
     return worst
 
 
@@ -60,6 +61,24 @@ def test_all_wheels_stay_within_the_lanes_where_the_lanes_middle_is_too_sharp(tu
     assert np.abs(path.curvature_1pm).max() <= 0.33
     assert np.abs(np.diff(path.heading_rad)).max() < 0.2  # no leap at the seams
     assert np.linalg.norm(np.diff(path.points_m, axis=0), axis=1).max() < 0.6
+
+
+@pytest.mark.parametrize("turn_deg", [-90.0, 60.0, 110.0])
+def test_a_corner_is_driven_so_slowly_that_the_wheels_can_follow(turn_deg):
+    network, config = corner_of(turn_deg, radius=4.0), NavigatorConfig()
+    course = make_course(network, pieces_of(network), 2, 40.0, config.drive, VEHICLE)
+    wheels = np.arctan(VEHICLE.wheelbase_m * course.path.curvature_1pm)
+    over_m = 1.0  # the wheels may be early and late by half of that
+    turned = np.abs(wheels[4:] - wheels[:-4]) / over_m
+    assert (turned * course.speed_mps[2:-2]).max() < VEHICLE.steering_rate_radps
+    assert course.speed_mps.min() > 1.2
+
+
+def test_of_ways_that_keep_clear_the_one_with_most_room_is_taken():
+    network = corner_of(100.0, radius=5.0)
+    corner = best_corner(network, (0, 1, 2), VEHICLE)
+    assert corner is not None
+    assert outside_m(network, corner.bend[:, :3], HALF_WIDTH_M - 0.2) == 0.0
 
 
 def test_a_gentle_bend_keeps_its_path():

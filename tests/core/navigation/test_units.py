@@ -9,7 +9,7 @@ from hippodrome.core.navigation import motion as motions
 from hippodrome.core.navigation import track as tracks
 from hippodrome.core.navigation.config import DriveConfig, NavigatorConfig, VehicleShape, WatchConfig
 from hippodrome.core.navigation.dashes import driven_m, line_levels
-from hippodrome.core.navigation.junctions import gate_speed_mps
+from hippodrome.core.navigation.junctions import gate_speed_mps, room_to_stop_m
 from hippodrome.core.navigation.searching import LaneMemory
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import can_stop, following_mps2, stop_mps2, stopping_mps
@@ -61,10 +61,18 @@ def test_the_intelligent_driver_model_holds_its_gap():
         (10.0, 8.0, Radar(lamp=Lamp.YELLOW), True),
         (-2.0, 3.0, Radar(lamp=Lamp.RED), False),  # in the junction already
         (60.0, 8.0, Radar(lamp=Lamp.RED), False),  # far off
+        (-0.8, 1.4, Radar(way_is_free=False), True),  # beyond the line, and before the mouth still
+        (-0.8, 3.0, Radar(way_is_free=False), False),  # it would come to stand in the junction
     ],
 )
 def test_who_goes_into_a_junction(to_stop_m, speed, radar, stops):
     assert math.isfinite(gate_speed_mps(to_stop_m, speed, radar, DRIVE)[0]) == stops
+
+
+def test_who_is_beyond_the_line_has_room_up_to_the_mouth():
+    assert room_to_stop_m(3.0) == 3.0
+    assert room_to_stop_m(-0.6) == pytest.approx(1.0)
+    assert room_to_stop_m(-5.0) == 0.0
 
 
 def test_a_steered_turn_tells_the_scale():

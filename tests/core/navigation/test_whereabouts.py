@@ -140,7 +140,7 @@ def test_what_tells_them_apart_gives_a_fix_at_the_right_place():
 def test_a_recognised_view_decides_between_roads_that_are_alike():
     network = twins()
     guide, eyes = guide_on(network), Eyes(network)
-    drive(lambda d, t, eyes: guide.step(d, t, eyes, eyes.pose.copy(), None), eyes, (20.0, 0.0, 0.0), [(30.0, 0.0)])
+    drive(lambda d, t, eyes: guide.step(d, t, eyes, eyes.pose.copy(), None), eyes, (20.0, 0.0, 0.0), [(38.0, 0.0)])
     assert guide.fix is not None and abs(guide.fix.pose[1]) < 1.0
 
 

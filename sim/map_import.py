@@ -87,10 +87,16 @@ def sumo_network(source: Path, folder: Path, driving_side: Choice = "auto") -> t
 
 def import_recipe(source: Path, driving_side: Choice = "auto") -> str:
     """What the import of a map depends on, in twelve digits."""
-    if not source.is_file():
-        raise HippodromeError(f"{source}: no such file; give {', '.join(KNOWN)}")
+    _require_file(source)
     recipe = sha256_of(source), OSM_OPTIONS, OPENDRIVE_OPTIONS, IMPORTER, driving_side
     return hashlib.sha256(repr(recipe).encode()).hexdigest()[:12]
+
+
+def _require_file(source: Path) -> None:
+    """Raise HippodromeError where there is no file, or a folder, a pipe or a device in its place."""
+    if not source.is_file():
+        reason = "not a file, but a folder, a pipe or a device" if source.exists() else "no such file"
+        raise HippodromeError(f"{source}: {reason}; give {', '.join(KNOWN)}")
 
 
 def import_map(
@@ -105,8 +111,7 @@ def import_map(
     Raises:
         HippodromeError: The map cannot be read, is too large, or has no roads for cars.
     """
-    if not source.is_file():
-        raise HippodromeError(f"{source}: no such file")
+    _require_file(source)
     if source.stat().st_size > MAX_UNPACKED_BYTES:
         raise _too_large(source)
     with temporary_folder() as folder:

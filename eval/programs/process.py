@@ -11,7 +11,6 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, BinaryIO, Final
@@ -21,6 +20,7 @@ from hippodrome.eval.methods.protocol import MethodError
 from hippodrome.eval.programs.containment import DEPTH, can_contain, contained
 from hippodrome.eval.programs.disk import Disk
 from hippodrome.eval.programs.family import descendant, family, peak_bytes, processes
+from hippodrome.eval.programs.references import printable
 from hippodrome.sim.method_spec import MethodSpec
 
 MEGABYTE: Final = 1_000_000
@@ -193,7 +193,7 @@ class Process:
             os.killpg(self.popen.pid, signal.SIGKILL)
 
 
-@contextmanager
+@contextlib.contextmanager
 def started(
     command: Sequence[str], folder: Path, limits: Limits, concealed: Sequence[Path] = (), fed: bool = False
 ) -> Iterator[Process]:
@@ -244,13 +244,10 @@ def _appended(log: Path, temporary: Path) -> BinaryIO:
     """The log of a program, open for more, and beside it a folder for temporary files. Raises MethodError."""
     try:
         temporary.mkdir(exist_ok=True)
-        # What an earlier call put in its place is not followed, and not waited for.
-        handle = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600)
+        return os.fdopen(_unblocked(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT), "ab")
     except OSError as error:
-        raise MethodError(
-            f"its folder cannot be used for another call: {error.strerror}; has it removed or replaced it?"
-        ) from None
-    return os.fdopen(handle, "ab")
+        words = "its folder cannot be used for another call"
+        raise MethodError(f"{words}: {error.strerror}; has it removed or replaced it?") from None
 
 
 def command_words(text: str, **places: Path) -> list[str]:
@@ -274,7 +271,7 @@ def last_words(log: Path) -> str:
         stream.seek(max(stream.tell() - 4096, 0))
         lines = stream.read().decode(errors="replace").splitlines()
     found = next((line.strip() for line in reversed(lines) if line.strip()), "none")
-    return "".join(letter if letter.isprintable() else "?" for letter in found)[:LAST_WORDS]
+    return printable(found)[:LAST_WORDS]
 
 
 def _unblocked(path: Path, flags: int = os.O_RDONLY) -> int:

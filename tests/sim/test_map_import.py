@@ -1,6 +1,7 @@
 """Maps of other makers: read for real by netconvert and libosmium, of bounded size, with the user's file in each error."""
 
 import gzip
+import os
 
 import numpy as np
 import pytest
@@ -268,3 +269,11 @@ def test_a_comma_in_a_folder_and_capitals_in_a_name_do_no_harm(tmp_path):
     (folder / "TOWN.NET.XML").write_bytes(gzip.decompress((folder / "town.net.xml.gz").read_bytes()))
     new_scenario("again", str(folder / "TOWN.NET.XML"), folder / "again.yaml")
     assert check_scenario(folder / "again.yaml").errors == ()
+
+
+def test_a_pipe_in_place_of_a_map_is_called_one(tmp_path):
+    os.mkfifo(tmp_path / "a.osm")
+    with pytest.raises(HippodromeError, match=r"a.osm: not a file, but a folder, a pipe or a device; give "):
+        import_map(tmp_path / "a.osm", tmp_path / "a.net.xml.gz")
+    with pytest.raises(HippodromeError, match=r"b.osm: no such file; give "):
+        import_map(tmp_path / "b.osm", tmp_path / "b.net.xml.gz")

@@ -43,3 +43,14 @@ def run(tmp_path_factory) -> Run:
     scenario.write_text(SCENARIO)
     status = main(["eval", str(scenario), "--workers", "2", "--out", str(folder / "two")])
     return Run(scenario, folder / "two", status)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with a recording and its road network, whole; tests break copies of them."""
+    from tests.subjects import net, recording  # which import the simulator, where a test asks for it
+
+    folder = tmp_path_factory.mktemp("made")
+    recording(folder)
+    net(folder)
+    return folder

@@ -16,7 +16,7 @@ from hippodrome.eval.results.model import write_results
 from tests.eval.exchange import subjects
 from tests.eval.exchange.subjects import COUNT, HEADER, ODOMETRY, PNG, TUM
 from tests.eval.results.test_model import results
-from tests.subjects import TINY, net, recording, resealed
+from tests.subjects import TINY, resealed
 from tests.test_more_inputs import answer, arrays
 
 DONE, BAD_INPUT = 0, 2
@@ -63,14 +63,6 @@ SCENARIOS = {
                           "not a SUMO network"),
 }  # fmt: skip
 NAMES = [b"new\nline", b"esc\x1b[31m", b"bad\xff", b"per%cent {0}", b"it's: #x", b"- a", "\u202eright-to-left".encode()]
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("made")
-    recording(folder)
-    net(folder)
-    return folder
 
 
 @pytest.mark.parametrize("name", TRAJECTORIES)

@@ -19,7 +19,7 @@ from hippodrome.sim.recording_checks import CHECKSUM
 from tests.eval.exchange.subjects import TUM
 from tests.eval.results.test_model import results
 from tests.sim.test_map_import import BLOCK
-from tests.subjects import TINY, net, recording, resealed
+from tests.subjects import TINY, resealed
 
 ROWS = TUM.splitlines()
 
@@ -33,14 +33,6 @@ def answer(capsys, *command):
     if status == BAD_INPUT:
         assert len(said.err.strip().splitlines()) == 1, said.err
     return status, said.err if status == BAD_INPUT else said.out
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("made")
-    recording(folder)
-    net(folder)
-    return folder
 
 
 def columns(text, change):

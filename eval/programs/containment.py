@@ -28,16 +28,16 @@ exit $?"""
 DEPTH: Final = 2  # the program is a child of the shell, which is a child of the process that is started
 
 
-def contained(command: Sequence[str], concealed: Sequence[Path], memory_bytes: int, file_bytes: int) -> list[str]:
+def contained(command: Sequence[str], concealed: Sequence[Path], address_bytes: int, file_bytes: int) -> list[str]:
     """The words that run a command within namespaces, and within limits.
 
     Args:
         command: Its words.
         concealed: Folders that it is to find empty.
-        memory_bytes: Limit of address space.
+        address_bytes: Limit of the address space of each process.
         file_bytes: Limit of the length of a file.
     """
-    numbers = [str(memory_bytes // 1024), str(file_bytes // 512), str(len(concealed))]
+    numbers = [str(address_bytes // 1024), str(file_bytes // 512), str(len(concealed))]
     folders = [str(folder.resolve()) for folder in concealed]
     return [*QUIET, "unshare", *MOUNTS, *PROCESSES, "sh", "-c", SCRIPT, "sh", *numbers, *folders, *command]
 

@@ -24,6 +24,9 @@ from hippodrome.eval.programs.references import printable
 from hippodrome.sim.method_spec import MethodSpec
 
 MEGABYTE: Final = 1_000_000
+# Address space over memory. Programs reserve much that they never touch: ORB-SLAM3 17 GB at once, late in a long drive, where it
+# holds 2 GB; runtimes with a heap of their own do so from their start. It bounds what is taken between two looks at the memory.
+ADDRESS_SPACE: Final = 4
 POLL_S: Final = 0.05  # between two looks at a process: its memory is looked at as well
 FIRST_POLL_S: Final = 0.001  # between the first ones: what ends at once has its memory looked at, too
 FILE_BYTES: Final = 4 << 30  # the longest file that a program may write, its printed text included
@@ -47,7 +50,7 @@ class Limits:
     """What a program may take."""
 
     time_s: float
-    memory_bytes: int  # address space of each process, and memory of all of them together
+    memory_bytes: int  # that all its processes hold together
     disk_bytes: int = 8_000 * MEGABYTE  # that it may keep on disk
     stall_s: float | None = None  # how long it may do no work: its threads wait for one another, say; None: for ever
 
@@ -56,6 +59,11 @@ class Limits:
         """Those that a scenario sets for a method."""
         memory_bytes, disk_bytes = (round(limit * MEGABYTE) for limit in (spec.memory_limit_mb, spec.disk_limit_mb))
         return cls(spec.time_limit_s, memory_bytes, disk_bytes, spec.stall_limit_s)
+
+    @property
+    def address_bytes(self) -> int:
+        """The address space that each of its processes may reserve."""
+        return ADDRESS_SPACE * self.memory_bytes
 
     @property
     def file_bytes(self) -> int:
@@ -219,7 +227,7 @@ def started(
             raise MethodError(f"there is no program '{command[0]}', or it may not be run; name it by a path, and chmod +x it")
         words, within = [str(word) for word in command], can_contain()
         if within:
-            words = contained(words, concealed, limits.memory_bytes, limits.file_bytes)
+            words = contained(words, concealed, limits.address_bytes, limits.file_bytes)
         try:
             popen = subprocess.Popen(
                 words, stdin=pipe, stdout=subprocess.PIPE if fed else stream, stderr=stream, start_new_session=True,
@@ -282,7 +290,7 @@ def _unblocked(path: Path, flags: int = os.O_RDONLY) -> int:
 def _limit(pid: int, limits: Limits) -> None:
     """Limits of the system for a process that has just begun; it and its children keep them."""
     with contextlib.suppress(ProcessLookupError, PermissionError, ValueError):
-        resource.prlimit(pid, resource.RLIMIT_AS, (limits.memory_bytes, limits.memory_bytes))
+        resource.prlimit(pid, resource.RLIMIT_AS, (limits.address_bytes, limits.address_bytes))
         resource.prlimit(pid, resource.RLIMIT_FSIZE, (limits.file_bytes, limits.file_bytes))
         resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0))
 

@@ -131,6 +131,12 @@ def test_a_program_that_eats_memory_is_stopped(row):
     assert "MemoryError" in found.failure or "memory" in found.failure
 
 
+def test_what_a_program_reserves_and_does_not_touch_is_no_memory(row):
+    """ORB-SLAM3 reserves 17 GB where it holds 2; so do runtimes with a heap of their own."""
+    found = row(python(f"import mmap\nreserved = mmap.mmap(-1, 800_000_000)\n{INTEGRATE}"), memory_limit_mb=300)
+    assert found.failure is None
+
+
 def test_several_processes_that_eat_memory_together_are_stopped(row):
     text = "import os, time\nfor _ in range(4):\n    os.fork()\nheld = bytearray(30_000_000)\ntime.sleep(30)\n"
     assert "more than its limit of 300 MB" in row(python(text), memory_limit_mb=300, time_limit_s=20).failure

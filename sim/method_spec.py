@@ -30,7 +30,7 @@ class MethodSpec(Spec):
     environment: Path | None = None  # requirements with hashes: {python} stands for the Python of an environment made of them
     time_limit_s: Annotated[float, Field(gt=0, le=86_400)] = 3_600.0  # for each drive
     stall_limit_s: Annotated[float, Field(gt=0)] | None = None  # without work; None: it may idle as long as it likes
-    memory_limit_mb: Annotated[float, Field(ge=64)] = 8_000.0  # held by all its processes; each may reserve four times that
+    memory_limit_mb: Annotated[float, Field(ge=64)] = 8_000.0  # held by all its processes; each may reserve 16 times that
     disk_limit_mb: Annotated[float, Field(gt=0)] = 8_000.0  # of what it keeps in its folder, or has open for writing
 
     @model_validator(mode="before")

@@ -24,9 +24,9 @@ from hippodrome.eval.programs.references import printable
 from hippodrome.sim.method_spec import MethodSpec
 
 MEGABYTE: Final = 1_000_000
-# Address space over memory. Programs reserve much that they never touch: ORB-SLAM3 17 GB at once, late in a long drive, where it
-# holds 2 GB; runtimes with a heap of their own do so from their start. It bounds what is taken between two looks at the memory.
-ADDRESS_SPACE: Final = 4
+# Address space over memory. Programs reserve much that they never touch: ORB-SLAM3 up to 53 GB at once, late in a long drive, where
+# it holds 4 GB; runtimes with a heap of their own do so from their start. It is a backstop for what is taken between two looks.
+ADDRESS_SPACE: Final = 16
 POLL_S: Final = 0.05  # between two looks at a process: its memory is looked at as well
 FIRST_POLL_S: Final = 0.001  # between the first ones: what ends at once has its memory looked at, too
 FILE_BYTES: Final = 4 << 30  # the longest file that a program may write, its printed text included

@@ -24,7 +24,7 @@ from hippodrome.eval.programs.references import printable
 from hippodrome.sim.method_spec import MethodSpec
 
 MEGABYTE: Final = 1_000_000
-# Address space over memory. Programs reserve much that they never touch: ORB-SLAM3 up to 53 GB at once, late in a long drive, where
+# Address space over memory. Programs reserve much that they never touch: ORB-SLAM3 53 GB at once, late in a long drive, where
 # it holds 4 GB; runtimes with a heap of their own do so from their start. It is a backstop for what is taken between two looks.
 ADDRESS_SPACE: Final = 16
 POLL_S: Final = 0.05  # between two looks at a process: its memory is looked at as well

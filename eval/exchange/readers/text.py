@@ -59,7 +59,7 @@ def read_values(path: Path, text: str) -> Any:
     if len(text) > MAX_BYTES:
         raise ExchangeError(f"{path}: {len(text)} characters of YAML, the limit is {MAX_BYTES}; it is no description of a sensor")
     try:
-        return parse_yaml(text, str(path))[1]
+        return parse_yaml(text, str(path), ours=False)[1]
     except ScenarioError as error:
         raise ExchangeError(str(error)) from None
 

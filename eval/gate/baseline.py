@@ -7,9 +7,11 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
 
 from hippodrome._files import read_bounded, why_unreadable, write_atomically
+from hippodrome._json import parse_json
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.results.model import (
     MAX_BYTES,
@@ -22,6 +24,7 @@ from hippodrome.eval.results.model import (
     to_json,
 )
 from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
+from hippodrome.sim.limits import refuse_truth_values
 
 FORMAT: Final = 1
 
@@ -45,6 +48,12 @@ class GateError(HippodromeError):
 
 class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = handler(source)
+        refuse_truth_values(schema, handler.resolve_ref_schema)
+        return schema
 
 
 class Figure(_Model):
@@ -92,7 +101,7 @@ def write_baseline(path: Path, baseline: Baseline) -> None:
 def read_baseline(path: Path) -> Baseline:
     """Read and validate. Raises GateError."""
     try:
-        data = json.loads(read_bounded(path, MAX_BYTES).decode("utf-8"))
+        data = parse_json(read_bounded(path, MAX_BYTES))
         if isinstance(data, dict) and data.get("format") != FORMAT:
             raise GateError(
                 f"{path}: baseline format {data.get('format')}, this version reads {FORMAT}; refresh it with --update"

@@ -6,12 +6,15 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
 
 from hippodrome._files import read_bounded, why_unreadable, write_atomically
+from hippodrome._json import parse_json
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.metrics.localization import LocalizationScore
 from hippodrome.eval.metrics.trajectory import Score
+from hippodrome.sim.limits import refuse_truth_values
 
 DECIMALS: Final = 6  # of every number: finer than any figure means, coarser than the rounding in which machines differ
 MAX_BYTES: Final = 64 << 20  # of a file that is read: far more than any run writes
@@ -26,6 +29,12 @@ class _Model(BaseModel):
     """Unknown fields are kept: the file may be of a later version."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = handler(source)
+        refuse_truth_values(schema, handler.resolve_ref_schema)
+        return schema
 
 
 class Network(_Model):
@@ -181,7 +190,7 @@ def write_results(path: Path, results: Results) -> None:
 def read_results(path: Path) -> Results:
     """Read and validate ``results.json``. Raises ResultsError, which names the file, the field and the reason."""
     try:
-        return Results.model_validate(json.loads(read_bounded(path, MAX_BYTES).decode("utf-8")))
+        return Results.model_validate(parse_json(read_bounded(path, MAX_BYTES)))
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])

@@ -27,6 +27,7 @@ from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
 from hippodrome.sim.limits import refuse_truth_values
 
 FORMAT: Final = 1
+LARGEST: Final = 1e12  # of a figure: farther than any planet
 
 
 MISSIONS: Final = {  # figures of missions that are the better the smaller they are: name with unit, and definition
@@ -106,7 +107,7 @@ def read_baseline(path: Path) -> Baseline:
             raise GateError(
                 f"{path}: baseline format {data.get('format')}, this version reads {FORMAT}; refresh it with --update"
             )
-        return Baseline.model_validate(data)
+        baseline = Baseline.model_validate(data)
     except FileNotFoundError:
         raise GateError(f"{path}: no baseline there; make one with `hippodrome gate --update`") from None
     except ValidationError as error:
@@ -116,6 +117,12 @@ def read_baseline(path: Path) -> Baseline:
     except (OSError, ValueError, RecursionError) as error:  # ValueError: no JSON, no UTF-8, or a number of thousands of digits
         cure = "name another, or make it anew with --update"
         raise GateError(f"{path}: not a readable baseline: {why_unreadable(error)}; {cure}") from error
+    for cell in baseline.cells:
+        for name, figure in cell.figures.items():
+            if not 0.0 <= figure.value <= LARGEST:  # nothing would ever be worse by a share than one below zero
+                place, why = f"{cell.scenario}, seed {cell.seed}, {cell.method}", "which no error is"
+                raise GateError(f"{path}: {place}: {name} is {figure.value:g}, {why}; make it anew with --update")
+    return baseline
 
 
 def question_of(result: ScenarioResult) -> str:

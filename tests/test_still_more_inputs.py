@@ -139,7 +139,11 @@ FIELDS = {
     ),
     "a-figure-of-zero": (lambda row: row["figures"]["APE mean (m)"].update(value=0.0), DONE, "same|no worse"),
     "a-subnormal-figure": (lambda row: row["figures"]["APE mean (m)"].update(value=5e-324), DONE, "no worse"),
-    "a-huge-figure": (lambda row: row["figures"]["APE mean (m)"].update(value=1e308), BAD_INPUT, r"is 1e\+308, which no error is"),
+    "a-huge-figure": (
+        lambda row: row["figures"]["APE mean (m)"].update(value=1e308),
+        BAD_INPUT,
+        r"is 1e\+308, which no error is",
+    ),
     "words-for-a-seed": (lambda row: row.update(seed="three"), BAD_INPUT, "seed: Input should be a valid integer"),
     "a-seed-of-a-half": (lambda row: row.update(seed=0.5), BAD_INPUT, "seed: Input should be a valid integer"),
     "a-key-of-nobody": (lambda row: row.update(nobody=1), BAD_INPUT, "nobody: Extra inputs"),

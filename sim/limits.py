@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, PydanticCustomError
 
 # Names, or ends of names, of shares of a whole; and of what is divided by, or counts something that there must be.
 SHARES: Final = ("share", "memory", "top", "bottom", "trimmed_share", "tolerance")
@@ -29,6 +29,7 @@ LARGEST_FACTOR: Final = 1e4  # a number without a unit may be so many times its 
 SMALLEST_DIVISOR: Final = 1e4  # of what is divided by, the least is this part of the default: a finer grid fills the memory
 LARGEST_COUNT_FACTOR: Final = 100  # and a whole one so many times: it is the size of something
 ENDLESS: Final = ("bent_cost",)  # keys of which infinity switches something off, though their default is finite
+CHECKED: Final = "refuses_truth_values"  # mark in the schema of a number that is done
 ANGLES_OF_VIEW: Final = {"fov_deg": (20.0, 150.0)}  # as the scenario's camera
 
 
@@ -48,6 +49,35 @@ def limit_numbers(schema: CoreSchema, resolve: Callable[[Any], Any]) -> None:
             number["ge"] = low
         if not {"le", "lt"} & set(number):
             number["le"] = high
+    refuse_truth_values(schema, resolve)
+
+
+def refuse_truth_values(schema: CoreSchema, resolve: Callable[[Any], Any]) -> None:
+    """Let no number in pydantic's schema be given as true or false, which pydantic would take for 1 and 0; in place.
+
+    Args:
+        schema: The schema, as pydantic made it.
+        resolve: Answers a reference to another schema with that schema.
+    """
+    for _, _, number in list(_numbers(schema, resolve, "", None, set())):
+        if number.get("metadata", {}).get(CHECKED):
+            continue
+        inner = {**number, "metadata": {CHECKED: True}}
+        check = _no_truth_value if number["type"] == "float" else _no_truth_value_but_whole
+        number.clear()
+        number.update({"type": "function-before", "function": {"type": "no-info", "function": check}, "schema": inner})
+
+
+def _no_truth_value(given: Any) -> Any:
+    if isinstance(given, bool):
+        raise PydanticCustomError("float_type", "Input should be a valid number")
+    return given
+
+
+def _no_truth_value_but_whole(given: Any) -> Any:
+    if isinstance(given, bool):
+        raise PydanticCustomError("int_type", "Input should be a valid integer")
+    return given
 
 
 def _numbers(
@@ -76,6 +106,8 @@ def _numbers(
         for place, item in enumerate(items if isinstance(items, list) else [items]):
             several = isinstance(default, tuple) and len(default) > place
             yield from _numbers(item, resolve, name, _hardest(default, place) if several else None, seen)
+    elif kind == "dict":
+        yield from _numbers(schema.get("values_schema", {"type": "any"}), resolve, name, None, seen)
     elif "schema" in schema:  # a default, None or a value, a check before or after, the model around its fields
         yield from _numbers(schema["schema"], resolve, name, schema.get("default", default), seen)
 

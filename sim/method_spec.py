@@ -8,17 +8,18 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_serializer, model_validator
 
+from hippodrome.sim.key_words import CLASS, NEED
 from hippodrome.sim.spec import Spec
 
 Layout = Literal["tum", "euroc", "kitti", "rosbag2", "mcap"]
 STEREO_LAYOUTS: Final = ("euroc", "kitti")  # those that have a place for the right image
-Need = Annotated[str, Field(pattern=r"^(road_network|start_pose|stereo|grain|metric_scale|[1-9][0-9]{1,3}x[1-9][0-9]{1,3})$")]
+Need = Annotated[str, Field(pattern=NEED)]
 
 
 class MethodSpec(Spec):
     """One method: a Python class, a program that reads files, or a program that is fed frame by frame."""
 
-    class_: Annotated[str | None, Field(alias="class", pattern=r"^[\w.]+:[\w.]+$")] = None  # my_package.my_module:MyMapper
+    class_: Annotated[str | None, Field(alias="class", pattern=CLASS)] = None  # my_package.my_module:MyMapper
     command: str | None = None  # of a program that reads files; {sequence} and {out} stand for folders
     stream: str | None = None  # of a program that is fed on standard input
     config: dict[str, Any] = Field(default_factory=dict)  # for the class: the fields of its own Config
@@ -37,6 +38,8 @@ class MethodSpec(Spec):
     @classmethod
     def _short_form(cls, data: Any) -> Any:
         """A text alone is ``exec:COMMAND``, ``stream:COMMAND``, or a class."""
+        if isinstance(data, int | float | list):
+            raise ValueError("Input should be my_package.my_module:MyClass, exec: or stream: and a command, or keys of its own")
         if not isinstance(data, str):
             return data
         kind, _, rest = data.partition(":")

@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from hippodrome.sim.key_words import METHOD_NAME, SOURCE
 from hippodrome.sim.spec import Spec
 
 RowKey = Literal["ours", "truth", "dead-reckoning", "no-reading", "on-sight", "paper", "kalman"]
-POLICY = r"(exec|stream):.*\S.*|[\w.]+:[\w.]+"  # a command that is fed step by step, or a Python object
-PolicyName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$")]
-Source = Annotated[str, Field(pattern=f"^({POLICY})$")]
+PolicyName = Annotated[str, Field(pattern=METHOD_NAME)]
+Source = Annotated[str, Field(pattern=SOURCE)]
 Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 MOST_MISSIONS = 1000  # a night of driving; more is a slip of the keyboard

@@ -20,6 +20,7 @@ import cv2
 import numpy as np
 
 from hippodrome._files import read_bounded, replacing, sha256_of
+from hippodrome._json import parse_json
 from hippodrome.core.types import Frame, HippodromeError, Observation, Step, Trajectory
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording_checks import MAX_FRAME_BYTES, check_samples, decoded_png, require_checksum, with_checksum
@@ -160,7 +161,7 @@ def open_recording(folder: Path, verify: bool = True) -> Recording:
     """A finished recording; ``verify`` compares every file with its hash first. Raises RecordingError."""
     path = folder / MANIFEST
     try:
-        manifest = json.loads(read_bounded(path, MAX_MANIFEST_BYTES).decode("utf-8"))
+        manifest = parse_json(read_bounded(path, MAX_MANIFEST_BYTES))
         files = manifest["sha256"]
         version = manifest["format"]
         require_checksum(manifest)

@@ -11,6 +11,7 @@ from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.mapping.config import MapperConfig
 from hippodrome.core.refinement.config import RefineConfig
 from hippodrome.sim.ego_spec import EgoSpec
+from hippodrome.sim.key_words import METHOD_NAME, SCENARIO_NAME
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.mission_spec import MissionLimits, MissionSpec
 from hippodrome.sim.renamed import with_present_names
@@ -23,10 +24,8 @@ from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.traffic_spec import TrafficSpec
 from hippodrome.sim.yaml_file import load_yaml
 
-SCENARIO_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # results are filed under it
-METHOD_NAME = r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$"  # of a method: it stands in tables, and files are named after it
 ClosedCount = Annotated[int, Field(ge=0, le=100)]
-MethodName = Annotated[str, Field(pattern=METHOD_NAME)]
+MethodName = Annotated[str, Field(pattern=METHOD_NAME)]  # it stands in tables, and files are named after it
 
 
 class DriveSpec(Spec):

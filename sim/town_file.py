@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from hippodrome._files import PACKAGE, code_sha256, sha256_of
+from hippodrome._json import parse_json
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.recording import read_arrays, write_arrays
@@ -100,7 +101,7 @@ def _from_file(path: Path, net_file: Path) -> Town | None:
     wanted = ["words", "signals_m", *joined, *(f"network_{name}" for name in NUMBERS)]
     try:
         arrays = read_arrays(path, wanted, ["heights_m", "junction_heights_m", "junction_heights_m_ends"])
-        words = json.loads(arrays["words"].tobytes())
+        words = parse_json(arrays["words"].tobytes())
         if (words["file"], words["sha256"]) != (path.name, _digest(arrays)):
             return None  # another network's, or changed
         numbers: dict[str, Any] = {name: arrays[f"network_{name}"] for name in NUMBERS}

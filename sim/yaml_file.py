@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
 from hippodrome._files import read_bounded
 from hippodrome.core.types import HippodromeError
+from hippodrome.sim.key_words import faults_of
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
-UNKNOWN_KEY = {"extra_forbidden", "unexpected_keyword_argument"}  # pydantic's names, of models and of dataclasses
 MAX_BYTES = 1 << 20  # a scenario is a page; more is a mistake or an attack
 MAX_NODES = 100_000  # values, aliases written out; a scenario has some 250 keys
 MOST_COUNTED = 1 << 62  # a bomb's size has as many digits as it has lines
 UNFINISHED = -1  # size of a node that is being counted
 MERGE = "tag:yaml.org,2002:merge"
+# Numbers of YAML 1.1 that nobody means: 010 is eight, and 1:30 is ninety.
+ODD_NUMBER: Final = re.compile(r"[-+]?(0[0-9_]+|[0-9_]+(:[0-9_.]+)+)")
 
 
 class ScenarioError(HippodromeError):
@@ -28,17 +31,20 @@ class ScenarioError(HippodromeError):
 def load_yaml(path: Path, model: type[ModelT]) -> ModelT:
     """The file as ``model``; nothing is repaired and unknown keys are refused. Raises ScenarioError."""
     root, data = parse_yaml(read_yaml(path), str(path))
+    try:
+        return as_model(path, data, model)
+    except ValidationError as error:
+        first, *others = faults_of(error, data)
+        place = ".".join(map(str, first.location))
+        more = f" (and {len(others)} more)" if others else ""
+        raise ScenarioError(f"{path}:{_line(root, first.location)}: {place}: {first.words}{more}") from None
+
+
+def as_model(path: Path, data: Any, model: type[ModelT]) -> ModelT:
+    """The values of a file as ``model``. Raises ScenarioError if they are no mapping, ValidationError if they do not fit."""
     if not isinstance(data, dict):
         raise ScenarioError(f"{path}: a scenario is a mapping of keys to values; see scenarios/ for examples")
-    try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(str(part) for part in first["loc"])
-        others = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-        raise ScenarioError(
-            f"{path}:{_line(root, first['loc'])}: {place}: {_reason(first['type'], first['msg'])}{others}"
-        ) from None
+    return model.model_validate(data)
 
 
 def read_yaml(path: Path) -> str:
@@ -51,15 +57,18 @@ def read_yaml(path: Path) -> str:
         raise ScenarioError(f"{path}: not UTF-8 text, so not a scenario") from None
 
 
-def parse_yaml(text: str, place: str) -> tuple[yaml.Node | None, Any]:
+def parse_yaml(text: str, place: str, ours: bool = True, twice: bool = False) -> tuple[yaml.Node | None, Any]:
     """The nodes of a YAML text, which know their lines, and its values, whatever is in it.
 
     Args:
         text: The text; of no more than ``MAX_BYTES``, as YAML is slow to read.
         place: What errors begin with: the file.
+        ours: Whether numbers that YAML reads as others than they look are refused; other tools' files may have such as times.
+        twice: Whether a key may be given twice, of which YAML takes the last one without a word.
 
     Raises:
-        ScenarioError: It is no YAML, has a value that cannot be made, or grows beyond bounds by its aliases and merge keys.
+        ScenarioError: It is no YAML, has a value that cannot be made, names a key twice, or grows beyond bounds by its aliases
+            and merge keys.
     """
     loader = yaml.SafeLoader("")
     try:
@@ -69,8 +78,12 @@ def parse_yaml(text: str, place: str) -> tuple[yaml.Node | None, Any]:
             return None, None
         if (size := _expanded_size(root, {})) > MAX_NODES:
             raise ScenarioError(f"{place}: its aliases and merge keys make {size} values, the limit is {MAX_NODES}; write it out")
+        if not twice and (first := next(repeated_keys(root, (), set()), None)) is not None:
+            raise ScenarioError(f"{place}:{first[0]}: {first[1]}")
         for scalar in _scalars(root, set()):
             _require_value(loader, scalar, place)
+            if ours:
+                _require_plain(scalar, place)
         return root, loader.construct_document(root)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -129,8 +142,33 @@ def _require_value(loader: yaml.SafeLoader, node: yaml.ScalarNode, place: str) -
         raise ScenarioError(f"{place}:{node.start_mark.line + 1}: {cause}") from None
 
 
-def _reason(kind: str, message: str) -> str:
-    return "unknown key; see the scenario reference in docs/scenarios.md" if kind in UNKNOWN_KEY else message
+def _require_plain(node: yaml.ScalarNode, place: str) -> None:
+    """Raise ScenarioError, with the line, where YAML reads another number than stands there."""
+    if node.style is None and node.tag.rpartition(":")[2] in ("int", "float") and ODD_NUMBER.fullmatch(node.value):
+        cause = f"'{node.value[:40]}' is another number for YAML than it looks; write it in digits, or in quotes if it is text"
+        raise ScenarioError(f"{place}:{node.start_mark.line + 1}: {cause}")
+
+
+def repeated_keys(node: yaml.Node | None, path: tuple[str, ...], seen: set[int]) -> Iterator[tuple[int, str]]:
+    """Line and words for each key below ``node``, which lies at ``path``, that is given twice.
+
+    Nodes in ``seen`` are left out: an alias may lead back to one of them.
+    """
+    if node is None or isinstance(node, yaml.ScalarNode) or id(node) in seen:
+        return
+    seen.add(id(node))
+    if isinstance(node, yaml.SequenceNode):
+        for number, item in enumerate(node.value):
+            yield from repeated_keys(item, (*path, str(number)), seen)
+        return
+    first: dict[str, int] = {}
+    for key, value in node.value:
+        line, place = key.start_mark.line + 1, (*path, str(key.value))
+        if isinstance(key, yaml.ScalarNode):
+            if key.value in first:
+                yield line, f"{'.'.join(place)}: given twice, first in line {first[key.value]}; remove one"
+            first.setdefault(key.value, line)
+        yield from repeated_keys(value, place, seen)
 
 
 def _line(node: yaml.Node | None, location: Sequence[int | str]) -> int:

@@ -14,9 +14,9 @@ import hippodrome.core.types
 ROOT = Path(hippodrome.core.types.__file__).parent.parent
 MAY_IMPORT = {
     "core": {"core"},
-    "sim": {"_files", "_folders", "_native", "_processes", "core", "sim"},
+    "sim": {"_files", "_folders", "_json", "_native", "_processes", "core", "sim"},
     "proto": {"_files", "core", "proto"},
-    "eval": {"_files", "_folders", "_native", "_output", "_processes", "core", "sim", "proto", "eval"},
+    "eval": {"_files", "_folders", "_json", "_native", "_output", "_processes", "core", "sim", "proto", "eval"},
 }
 # What each room of core may import; every room may import types and se2.
 CORE_ROOMS = {

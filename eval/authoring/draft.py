@@ -19,9 +19,10 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.files.scenarios import PACKAGE, located
 from hippodrome.sim.driving_side import Choice
+from hippodrome.sim.key_words import SCENARIO_NAME
 from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
 from hippodrome.sim.net_cut import Around, cut_network, import_options
-from hippodrome.sim.scenario import SCENARIO_NAME, Scenario
+from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.tour import tour_graph
 from hippodrome.sim.town import build_town
 from hippodrome.sim.town_spec import TownSpec

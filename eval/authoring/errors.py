@@ -3,68 +3,50 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Final
 
 import yaml
 from pydantic import ValidationError
 
-from hippodrome.eval.authoring.keys import key_paths, scenario_keys
+from hippodrome.eval.authoring.keys import key_paths
+from hippodrome.sim.key_words import UNKNOWN_KEY, Fault, faults_of
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import SelfMotionNoise
-from hippodrome.sim.yaml_file import ScenarioError, load_yaml, parse_yaml, read_yaml
-
-UNKNOWN: Final = "extra_forbidden"  # pydantic's name for a key that the model does not have
-MODEL_TYPES: Final = ("model_type", "dataclass_type")  # pydantic's names for a plain value where a mapping is wanted
+from hippodrome.sim.yaml_file import ScenarioError, as_model, parse_yaml, read_yaml, repeated_keys
 
 
 def file_errors(path: Path) -> tuple[str, ...]:
     """One line for each error, in the order of the file; none if it is a scenario. Networks are not looked at."""
-    first: ScenarioError | None = None
     try:
-        load_yaml(path, Scenario)
-    except ScenarioError as error:
-        first = error
-        if not isinstance(error.__context__, ValidationError):  # unreadable, or no YAML: there is no second error to find
-            return (str(error),)
-    root, _ = parse_yaml(read_yaml(path), str(path))
-    found = list(_repeated(root, (), set()))
-    if first is not None and isinstance(first.__context__, ValidationError):
-        found += _invalid(root, first.__context__)
+        root, data = parse_yaml(read_yaml(path), str(path), twice=True)
+        found = list(repeated_keys(root, (), set()))
+        as_model(path, data, Scenario)
+    except ScenarioError as error:  # unreadable, or no YAML: there is no second error to find
+        return (str(error),)
+    except ValidationError as error:
+        found += _invalid(root, faults_of(error, data))
     found = sorted(dict.fromkeys(found), key=lambda one: one[0])
     return tuple(f"{path}:{line}: {words}" for line, words in found)
 
 
-def _invalid(root: yaml.Node | None, error: ValidationError) -> Iterator[tuple[int, str]]:
+def _invalid(root: yaml.Node | None, faults: Iterable[Fault]) -> Iterator[tuple[int, str]]:
     """Line and words of what the model refuses."""
-    for one in error.errors(include_url=False):
-        line, place, node = _find(root, one["loc"])
-        if one["type"] == "missing":
-            place = f"{place}.{one['loc'][-1]}".removeprefix(".")
-        elif isinstance(node, yaml.MappingNode) and isinstance(one.get("input"), int | float) and isinstance(one["loc"][-1], str):
-            place = f"{place}: {one['loc'][-1]}"  # a key that stands in the file below an earlier name
-        if isinstance(node, yaml.MappingNode) and one["type"] == "literal_error":
-            continue  # a mapping was never meant to be one of the names: its own errors follow
-        if one["type"] in MODEL_TYPES and place == "noise":
-            continue  # a name was never meant to be a mapping: the error about names follows
-        yield line, f"{place}: {_reason(one, place)}".removeprefix(": ")
+    for fault in faults:
+        line, place, node = _find(root, fault.location)
+        if fault.kind == "missing":
+            place = f"{place}.{fault.location[-1]}".removeprefix(".")
+        elif isinstance(node, yaml.MappingNode) and isinstance(fault.given, int | float):
+            place = f"{place}: {fault.location[-1]}"  # a key that stands in the file below an earlier name
+        yield line, f"{place}: {_reason(fault, place)}".removeprefix(": ")
 
 
-def _reason(one: Mapping[str, Any], place: str) -> str:
-    """What is wrong with the value at ``place``, in our words where pydantic's would not help; ``one`` is its error."""
-    if one["type"] == UNKNOWN:
+def _reason(fault: Fault, place: str) -> str:
+    """What is wrong with the value at ``place``; of an unknown key, which one may be meant."""
+    if fault.kind in UNKNOWN_KEY:
         near = difflib.get_close_matches(place, _known(place), n=1, cutoff=0.6)
         return f"unknown key; {f'did you mean {near[0]}?' if near else 'docs/scenarios.md lists all'}"
-    if one["type"] == "missing":
-        return "must be given"
-    if one["type"] in MODEL_TYPES:
-        return "takes keys of its own; docs/scenarios.md lists them"
-    if one["type"] == "string_pattern_mismatch":
-        return next(key.meaning for key in scenario_keys() if key.name == place)
-    message = str(one["msg"]).removeprefix("Value error, ").partition(", unable to parse")[0]
-    given = one.get("input")
-    return f"{message}, not {given!r}" if isinstance(given, str | int | float) and "Input should" in message else message
+    return "must be given" if fault.kind == "missing" else fault.words
 
 
 def _known(place: str) -> list[str]:
@@ -91,20 +73,3 @@ def _find(node: yaml.Node | None, location: Sequence[int | str]) -> tuple[int, s
             line = node.start_mark.line + 1
             path.append(str(part))
     return line, ".".join(path), node
-
-
-def _repeated(node: yaml.Node | None, path: tuple[str, ...], seen: set[int]) -> Iterator[tuple[int, str]]:
-    """Line and words for each key that is given twice, of which YAML readers take the last one without a word.
-
-    Nodes in ``seen`` are left out: an alias may lead back to one of them.
-    """
-    if not isinstance(node, yaml.MappingNode) or id(node) in seen:
-        return
-    seen.add(id(node))
-    first: dict[str, int] = {}
-    for key, value in node.value:
-        line, place = key.start_mark.line + 1, (*path, str(key.value))
-        if key.value in first:
-            yield line, f"{'.'.join(place)}: given twice, first in line {first[key.value]}; remove one"
-        first.setdefault(key.value, line)
-        yield from _repeated(value, place, seen)

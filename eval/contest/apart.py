@@ -178,16 +178,21 @@ class Apart:
 
     def _send(self, process: Process, body: bytes) -> None:
         assert process.popen.stdin is not None
-        try:
-            process.popen.stdin.write(LENGTH.pack(len(body)) + body)
-            process.popen.stdin.flush()
-        except BrokenPipeError:
-            raise self._ended(process) from None
+        sink, view, began_s = process.popen.stdin.fileno(), memoryview(LENGTH.pack(len(body)) + body), time.monotonic()
+        os.set_blocking(sink, False)
+        while view:
+            try:
+                view = view[os.write(sink, view) :]
+            except BlockingIOError:
+                select.select([], [sink], [], POLL_S)
+                self._look(process, sink, began_s)
+            except BrokenPipeError:
+                raise self._ended(process) from None
 
     def _received(self, process: Process) -> bytes:
         """The next message. Raises MethodError if the process ends instead, or is past a limit."""
         assert process.popen.stdout is not None
-        source, held, wanted = process.popen.stdout.fileno(), bytearray(), LENGTH.size
+        source, held, wanted, began_s = process.popen.stdout.fileno(), bytearray(), LENGTH.size, time.monotonic()
         head = True
         while len(held) < wanted:
             if select.select([source], [], [], POLL_S)[0]:
@@ -200,12 +205,19 @@ class Apart:
                     if wanted > self._limits.memory_bytes:
                         raise MethodError(SCRIBBLED)
                     held.clear()
-            now_s = time.monotonic()
-            if now_s - self._looked_s > LOOK_S or process.left_s <= 0.0:
-                self._looked_s = now_s
-                if process.poll():
-                    raise self._ended(process)
+            self._look(process, source, began_s)
         return bytes(held)
+
+    def _look(self, process: Process, end: int, began_s: float) -> None:
+        """Raise MethodError if the process has ended, is past a limit, or closed the pipe ``end`` that is waited for."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s > LOOK_S or process.left_s <= 0.0:
+            self._looked_s = now_s
+            if process.poll():
+                raise self._ended(process)
+            if now_s - began_s > LOOK_S and process.has_let_go(end):
+                process.stop("it closed the pipe to the harness, which is its standard input or output")
+                raise self._ended(process)
 
     def _ended(self, process: Process) -> MethodError:
         """Why there is no answer; the process is over."""

@@ -24,8 +24,9 @@ from hippodrome.eval.programs.stream import StreamLocalizer, StreamMapper
 from hippodrome.eval.results.model import Declaration
 from hippodrome.eval.rivals.orbslam3.method import OrbSlam3
 from hippodrome.eval.rivals.rows import NoAttractor, RatSlamMethod
+from hippodrome.sim.key_words import METHOD_NAME, faults_of
 from hippodrome.sim.method_spec import MethodSpec
-from hippodrome.sim.scenario import METHOD_NAME, Scenario
+from hippodrome.sim.scenario import Scenario
 
 # In the order of the tables. They are made and run as everybody's methods are.
 BUILT_IN: Final[tuple[type[Any], ...]] = (DeadReckoning, SemiMetric, RatSlamMethod, NoAttractor, TopometricPaper, Topometric)
@@ -93,7 +94,7 @@ def parse_method(text: str) -> Added:
     try:
         spec = MethodSpec.model_validate(source)
     except ValidationError as error:
-        raise ValueError(f"'{text}': {error.errors(include_url=False)[0]['msg'].removeprefix('Value error, ')}") from None
+        raise ValueError(f"'{text}': {faults_of(error, source)[0].words}") from None
     return Added(name or (_program_name(rest) if kind in ("exec", "stream") else None), spec)
 
 

@@ -21,8 +21,8 @@ from hippodrome.eval.programs.process import Limits, Process, command_words, sta
 from hippodrome.eval.programs.stream import VERSION, Line, camera_message
 from hippodrome.proto import method_stream_pb2 as pb
 from hippodrome.proto.driving import command_of, lane_messages, observation_message, radar_message
+from hippodrome.sim.key_words import POLICY
 from hippodrome.sim.method_spec import MethodSpec
-from hippodrome.sim.mission_spec import POLICY
 from hippodrome.sim.render.camera import CameraSpec
 
 CHILD: Final = "hippodrome.eval.drive.child"

@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from hippodrome._files import PACKAGE, code_sha256, read_bounded, replacing, sha256_of, write_atomically
+from hippodrome._json import parse_json
 from hippodrome.core.navigation.config import PlanConfig
 from hippodrome.core.navigation.routes import mapped_lanes
 from hippodrome.core.navigation.types import Goal
@@ -126,7 +127,7 @@ def _world(scenario: Scenario, out: Path) -> World:
 def _kept(file: Path, trace_file: Path) -> dict[str, Any] | None:
     """What a finished mission left, if it and its trace are as they were written; what is broken or lost is made anew."""
     try:
-        kept = json.loads(read_bounded(file, MAX_MISSION_BYTES).decode())
+        kept = parse_json(read_bounded(file, MAX_MISSION_BYTES))
         timed = {"figures": kept["figures"], "cpu_s": kept["cpu_s"]}
         return timed if kept[SEAL] == _seal(timed, trace_file) else None
     except (OSError, ValueError, LookupError, TypeError, RecursionError, HippodromeError):

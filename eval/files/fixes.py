@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from hippodrome._files import open_regular
+from hippodrome._json import parse_json
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.files.fix_values import RANGE_ERROR_M, Fix, as_number, file_bytes, file_text, hdop_note, time_s
 from hippodrome.eval.files.nmea import nmea_fixes
@@ -169,7 +169,7 @@ def _csv(path: Path, text: str, notes: list[str]) -> Iterator[Fix]:
 
 def _geojson(path: Path, text: str) -> Iterator[Fix]:
     try:
-        content: Any = json.loads(text)
+        content: Any = parse_json(text)
     except (ValueError, RecursionError) as error:
         raise TrajectoryError(f"{path}: not a GeoJSON file: {str(error)[:80]}") from None
     features = content.get("features", [content]) if isinstance(content, dict) else []

@@ -11,7 +11,7 @@ from typing import Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from hippodrome._files import write_atomically
+from hippodrome._files import read_bounded, write_atomically
 
 PROGRESS: Final = ".progress.json"  # in the folder of a run that is under way, or that did not end well
 MAX_BYTES: Final = 100_000  # of such a file: a few stages take a few hundred
@@ -91,8 +91,7 @@ class Teller:
 
 def read_progress(folder: Path) -> Progress | None:
     """How far the run in a folder is; None where none is under way, or where its file cannot be read just now."""
-    path = folder / PROGRESS
     try:
-        return Progress.model_validate_json(path.read_bytes()) if path.stat().st_size <= MAX_BYTES else None
+        return Progress.model_validate_json(read_bounded(folder / PROGRESS, MAX_BYTES))
     except (OSError, ValidationError):
         return None

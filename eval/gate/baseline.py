@@ -7,9 +7,11 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
 
 from hippodrome._files import read_bounded, why_unreadable, write_atomically
+from hippodrome._json import parse_json
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.results.model import (
     MAX_BYTES,
@@ -22,8 +24,10 @@ from hippodrome.eval.results.model import (
     to_json,
 )
 from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
+from hippodrome.sim.limits import refuse_truth_values
 
 FORMAT: Final = 1
+LARGEST: Final = 1e12  # of a figure: farther than any planet
 
 
 MISSIONS: Final = {  # figures of missions that are the better the smaller they are: name with unit, and definition
@@ -45,6 +49,12 @@ class GateError(HippodromeError):
 
 class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = handler(source)
+        refuse_truth_values(schema, handler.resolve_ref_schema)
+        return schema
 
 
 class Figure(_Model):
@@ -92,12 +102,12 @@ def write_baseline(path: Path, baseline: Baseline) -> None:
 def read_baseline(path: Path) -> Baseline:
     """Read and validate. Raises GateError."""
     try:
-        data = json.loads(read_bounded(path, MAX_BYTES).decode("utf-8"))
+        data = parse_json(read_bounded(path, MAX_BYTES))
         if isinstance(data, dict) and data.get("format") != FORMAT:
             raise GateError(
                 f"{path}: baseline format {data.get('format')}, this version reads {FORMAT}; refresh it with --update"
             )
-        return Baseline.model_validate(data)
+        baseline = Baseline.model_validate(data)
     except FileNotFoundError:
         raise GateError(f"{path}: no baseline there; make one with `hippodrome gate --update`") from None
     except ValidationError as error:
@@ -107,6 +117,12 @@ def read_baseline(path: Path) -> Baseline:
     except (OSError, ValueError, RecursionError) as error:  # ValueError: no JSON, no UTF-8, or a number of thousands of digits
         cure = "name another, or make it anew with --update"
         raise GateError(f"{path}: not a readable baseline: {why_unreadable(error)}; {cure}") from error
+    for cell in baseline.cells:
+        for name, figure in cell.figures.items():
+            if not 0.0 <= figure.value <= LARGEST:  # nothing would ever be worse by a share than one below zero
+                place, why = f"{cell.scenario}, seed {cell.seed}, {cell.method}", "which no error is"
+                raise GateError(f"{path}: {place}: {name} is {figure.value:g}, {why}; make it anew with --update")
+    return baseline
 
 
 def question_of(result: ScenarioResult) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import resource
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -46,6 +47,31 @@ def descendant(head: int, depth: int) -> int | None:
             return None
         found = min(children)
     return found
+
+
+def holds_pipe(head: int, end: int) -> bool:
+    """Whether a program, or what it started, has the other side of the pipe ``end`` open.
+
+    ``head`` is the process that leads to the program, by way of a shell; both hold the pipe as long as they live, and are not
+    meant. True where nobody can tell, or there is no program yet.
+    """
+    running, pipe = processes(), f"pipe:[{os.fstat(end).st_ino}]"
+    pids = [pid for pid in family(head, running) if head not in (pid, running[pid].parent)]
+    return not pids or any(_has_open(pid, pipe) for pid in pids)
+
+
+def _has_open(pid: int, pipe: str) -> bool:
+    try:
+        with os.scandir(f"/proc/{pid}/fd") as entries:
+            for entry in entries:
+                with contextlib.suppress(FileNotFoundError):  # closed just now
+                    if str(Path(entry.path).readlink()) == pipe:
+                        return True
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    except OSError:
+        return True
+    return False
 
 
 def peak_bytes(pid: int) -> int:

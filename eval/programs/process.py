@@ -19,7 +19,7 @@ from hippodrome._processes import dying_with_me
 from hippodrome.eval.methods.protocol import MethodError
 from hippodrome.eval.programs.containment import DEPTH, can_contain, contained
 from hippodrome.eval.programs.disk import Disk
-from hippodrome.eval.programs.family import descendant, family, peak_bytes, processes
+from hippodrome.eval.programs.family import descendant, family, holds_pipe, peak_bytes, processes
 from hippodrome.eval.programs.references import printable
 from hippodrome.sim.method_spec import MethodSpec
 
@@ -143,6 +143,10 @@ class Process:
             if (peak := peak_bytes(pid)) > 0:
                 self.peak_rss_bytes = max(peak, self.peak_rss_bytes or 0)
         return held
+
+    def has_let_go(self, end: int) -> bool:
+        """Whether the program closed its side of the pipe ``end`` and runs on. Without namespaces the pipe itself says so."""
+        return self.contained and not self.poll() and not holds_pipe(self.popen.pid, end)
 
     def _keeps_too_much(self, pids: Iterable[int] = ()) -> str | None:
         """What is to be said where it, or what it left, takes more of the disk than it may; None where it does not."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import select
+import struct
+import termios
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -102,13 +105,14 @@ class Line:
         self._process = process
         self._to, self._from = process.popen.stdin.fileno(), process.popen.stdout.fileno()
         self._held = bytearray()
-        self._looked_s = time.monotonic()
+        self._looked_s = self._asked_s = time.monotonic()
         os.set_blocking(self._to, False)
         os.set_blocking(self._from, False)
 
     def asked(self, message: pb.ToMethod, expected: str) -> pb.FromMethod:
         """The answer to a message. Raises MethodError if there is none, or it is another one than ``expected``."""
         data = message.SerializeToString()
+        self._asked_s = time.monotonic()
         self._send(_varint(len(data)) + data)
         while (body := self._message()) is None:
             self._receive()
@@ -161,6 +165,15 @@ class Line:
             self._process.poll()
             if (cause := self._process.failure()) is not None:
                 raise self._process.error(cause)
+            if now_s - self._asked_s > LOOK_S and self._is_closed(writing):
+                self._gone()
+
+    def _is_closed(self, writing: bool) -> bool:
+        """Whether the process closed a pipe that it still needs: for its answer, or for what it has not read yet."""
+        if not writing and self._process.has_let_go(self._from):
+            return True
+        unread = struct.unpack("i", fcntl.ioctl(self._to, termios.FIONREAD, bytes(4)))[0]
+        return (writing or unread > 0) and self._process.has_let_go(self._to)
 
     def _message(self) -> bytes | None:
         """The next whole message that has arrived."""

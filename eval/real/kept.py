@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from hippodrome._files import read_bounded
+from hippodrome._json import parse_json
 from hippodrome.core.types import HippodromeError, MatchBreak, MatchStatus
 from hippodrome.eval.real.findings import Finding, Kind
 
@@ -93,7 +93,7 @@ def _check_vertices(path: Path, stretches: list[tuple[int, int]], vertices: int)
 
 def _read(path: Path, model: TypeAdapter[Any], complaint: str) -> Any:
     try:
-        return model.validate_python(json.loads(read_bounded(path, MAX_BYTES).decode("utf-8")))
+        return model.validate_python(parse_json(read_bounded(path, MAX_BYTES)))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"]))

@@ -12,7 +12,7 @@ from typing import Annotated, Final
 
 import cv2
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from hippodrome._files import write_atomically
 from hippodrome.core.attractors.grid_cells import module_periods
@@ -35,7 +35,8 @@ from hippodrome.eval.report.evidence import (
     timed_path,
     worst_places,
 )
-from hippodrome.eval.results.model import MAX_BYTES, ResultsError
+from hippodrome.eval.results.kept import read_kept
+from hippodrome.eval.results.model import ResultsError
 from hippodrome.sim.recording import Recording
 
 AS_PRINTED: Final = "topometric, networks as printed"
@@ -163,13 +164,7 @@ def belief_of(
 
 def read_second_drive(path: Path) -> SecondDrive:
     """Read and validate ``belief.json``. Raises ResultsError."""
-    try:
-        if (size := path.stat().st_size) > MAX_BYTES:
-            raise ResultsError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
-        content = SecondDrive.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError) as error:
-        reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
-        raise ResultsError(f"{path}: not a readable second drive: {reason}; run `hippodrome eval` again") from error
+    content: SecondDrive = read_kept(path, SecondDrive, "not a readable second drive", "run `hippodrome eval` again")
     for belief in content.beliefs:
         columns = (value for value in belief.model_dump().values() if isinstance(value, list))
         if len({len(column) for column in columns}) != 1:

@@ -10,7 +10,7 @@ from typing import Annotated, Final
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 from shapely import LineString
 
 from hippodrome._files import write_atomically
@@ -20,7 +20,8 @@ from hippodrome.eval.methods.materials import Materials, Outcome, ScoredTrajecto
 from hippodrome.eval.methods.method import Method
 from hippodrome.eval.metrics.alignment import apply_to_positions, find_alignment
 from hippodrome.eval.metrics.association import associate
-from hippodrome.eval.results.model import MAX_BYTES, ResultsError
+from hippodrome.eval.results.kept import read_kept
+from hippodrome.eval.results.model import ResultsError
 from hippodrome.sim.recording import Recording
 
 MAP_JSON: Final = "map.json"
@@ -135,13 +136,7 @@ def add_layers(folder: Path, scored: Mapping[Method, ScoredTrajectory], truth: T
 
 def read_map_evidence(path: Path) -> MapEvidence:
     """Read and validate ``map.json``. Raises ResultsError."""
-    try:
-        if (size := path.stat().st_size) > MAX_BYTES:
-            raise ResultsError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
-        evidence = MapEvidence.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError) as error:
-        reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
-        raise ResultsError(f"{path}: not a readable map for the report: {reason}; run `hippodrome eval` again") from error
+    evidence: MapEvidence = read_kept(path, MapEvidence, "not a readable map for the report", "run `hippodrome eval` again")
     for layer in evidence.methods:
         lengths = {len(column) for column in (layer.t_s, layer.x_m, layer.y_m, layer.error_m)}
         if len(lengths) != 1 or any(vertex >= len(layer.t_s) for vertex in layer.worst):

@@ -11,13 +11,14 @@ from typing import Any, Final
 
 import cv2
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
 
+from hippodrome._files import read_bounded, why_unreadable
 from hippodrome.eval.methods.method import REFINED
 from hippodrome.eval.report.belief import BELIEF_JSON, SECOND_FRAMES, SecondDrive, read_second_drive
 from hippodrome.eval.report.evidence import MAP_JSON, THUMBNAILS, MapEvidence, read_map_evidence
 from hippodrome.eval.report.why import WHY_JSON, Places, read_why
-from hippodrome.eval.results.model import ResultsError
+from hippodrome.eval.results.kept import read_kept
+from hippodrome.eval.results.model import MAX_BYTES, ResultsError
 from hippodrome.eval.results.ratios import RATIOS
 from hippodrome.eval.results.table_two import TABLE_TWO, SequenceRow
 
@@ -81,21 +82,26 @@ def read_scenario_files(out: Path, name: str) -> ScenarioFiles:
     return ScenarioFiles(
         tuple(picture for path in figures if (picture := read_picture(path)) is not None),
         read_map_evidence(folder / MAP_JSON) if (folder / MAP_JSON).exists() else None,
-        data_uri("image/jpeg", frames.read_bytes()) if frames.exists() else None,
+        data_uri("image/jpeg", _bytes(frames)) if frames.exists() else None,
         tuple(_parsed(folder / TABLE_TWO, list[SequenceRow]) or ()),
         _parsed(folder / RATIOS, dict[str, Any]) or {},
         read_second_drive(second) if second.exists() else None,
-        data_uri("image/jpeg", second_frames.read_bytes()) if second_frames.exists() else None,
+        data_uri("image/jpeg", _bytes(second_frames)) if second_frames.exists() else None,
         read_why(folder / WHY_JSON) if (folder / WHY_JSON).exists() else None,
     )
 
 
 def _parsed(path: Path, kind: Any) -> Any:
     """A JSON file as this type, None if there is none. Raises ResultsError."""
+    return read_kept(path, kind, "not readable", "run `hippodrome baselines` again") if path.exists() else None
+
+
+def _bytes(path: Path) -> bytes:
+    """The content of a picture. Raises ResultsError."""
     try:
-        return TypeAdapter(kind).validate_json(path.read_bytes()) if path.exists() else None
-    except ValidationError as error:
-        raise ResultsError(f"{path}: not readable: {error.errors()[0]['msg']}; run `hippodrome baselines` again") from None
+        return read_bounded(path, MAX_BYTES)
+    except OSError as error:
+        raise ResultsError(f"{path}: cannot be read: {why_unreadable(error)}; run `hippodrome eval` again") from error
 
 
 def data_uri(media_type: str, content: bytes) -> str:
@@ -105,7 +111,7 @@ def data_uri(media_type: str, content: bytes) -> str:
 
 def read_picture(path: Path) -> Picture | None:
     """The figure as WebP, which takes a third of the PNG's size; without loss unless that is large. None if it is no picture."""
-    image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
+    image = cv2.imdecode(np.frombuffer(_bytes(path), np.uint8), cv2.IMREAD_COLOR)
     if image is None:
         return None
     _, coded = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, LOSSLESS])

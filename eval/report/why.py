@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from hippodrome._files import write_atomically
 from hippodrome.core.roads.network import RoadNetwork
@@ -17,7 +16,7 @@ from hippodrome.eval.methods.materials import Outcome
 from hippodrome.eval.methods.method import Method
 from hippodrome.eval.report.candidates import LaneCandidate, lanes_beside
 from hippodrome.eval.report.evidence import DECIMALS_M, MAP_JSON, EvidenceModel, Layer, read_map_evidence
-from hippodrome.eval.results.model import MAX_BYTES, ResultsError
+from hippodrome.eval.results.kept import read_kept
 
 WHY_JSON: Final = "why.json"
 NEIGHBOURS: Final = 3  # vertices of other passes that are named
@@ -65,13 +64,8 @@ def write_why(folder: Path, localized: Mapping[Method, Outcome], roads: RoadNetw
 
 def read_why(path: Path) -> Places:
     """Read and validate ``why.json``. Raises ResultsError."""
-    try:
-        if (size := path.stat().st_size) > MAX_BYTES:
-            raise ResultsError(f"{path}: {size} bytes, the limit is {MAX_BYTES}")
-        return Places.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError) as error:
-        reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
-        raise ResultsError(f"{path}: not readable: {reason}; run `hippodrome eval` again") from error
+    places: Places = read_kept(path, Places, "not readable", "run `hippodrome eval` again")
+    return places
 
 
 def place_of(layer: Layer, vertex: int, cognitive_map: CognitiveMap, roads: RoadNetwork | None = None) -> Place:

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
 
 from hippodrome._files import read_bounded, why_unreadable, write_atomically
+from hippodrome._json import parse_json
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.metrics.localization import LocalizationScore
 from hippodrome.eval.metrics.trajectory import Score
+from hippodrome.sim.limits import refuse_truth_values
 
 DECIMALS: Final = 6  # of every number: finer than any figure means, coarser than the rounding in which machines differ
 MAX_BYTES: Final = 64 << 20  # of a file that is read: far more than any run writes
 TIMING_FIELDS: Final = frozenset({"cpu_percent", "peak_rss_bytes", "initial_time_ms", "latency_ms", "timings", "realtime_factor"})
+
+
+Length: TypeAlias = Annotated[float, Field(ge=0.0)]  # of an error: none is below zero
 
 
 class ResultsError(HippodromeError):
@@ -26,6 +32,12 @@ class _Model(BaseModel):
     """Unknown fields are kept: the file may be of a later version."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = handler(source)
+        refuse_truth_values(schema, handler.resolve_ref_schema)
+        return schema
 
 
 class Network(_Model):
@@ -41,11 +53,11 @@ class ErrorSummary(_Model):
     """The figures of a ``Score``. Those that are quoted from a paper have a mean only."""
 
     definition: str
-    mean_m: float
-    median_m: float | None = None
-    p95_m: float | None = None
-    max_m: float | None = None
-    rmse_m: float | None = None
+    mean_m: Length
+    median_m: Length | None = None
+    p95_m: Length | None = None
+    max_m: Length | None = None
+    rmse_m: Length | None = None
     count: int | None = None
     matched: int | None = None
     total: int | None = None
@@ -56,10 +68,10 @@ class LocalizationSummary(_Model):
 
     definition: str
     success: bool | None = None
-    error_mean_m: float | None = None
-    error_median_m: float | None = None
-    error_p95_m: float | None = None
-    error_max_m: float | None = None
+    error_mean_m: Length | None = None
+    error_median_m: Length | None = None
+    error_p95_m: Length | None = None
+    error_max_m: Length | None = None
     initial_time_ms: float | None = None
     initial_drive_s: float | None = None
     initial_distance_m: float | None = None
@@ -181,7 +193,7 @@ def write_results(path: Path, results: Results) -> None:
 def read_results(path: Path) -> Results:
     """Read and validate ``results.json``. Raises ResultsError, which names the file, the field and the reason."""
     try:
-        return Results.model_validate(json.loads(read_bounded(path, MAX_BYTES).decode("utf-8")))
+        return Results.model_validate(parse_json(read_bounded(path, MAX_BYTES)))
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])

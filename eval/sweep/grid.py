@@ -17,6 +17,7 @@ from hippodrome.eval.contest.sources import methods_sha256
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.reuse import figure_code_sha256
 from hippodrome.eval.sweep.executors import SweepError
+from hippodrome.sim.key_words import faults_of
 from hippodrome.sim.renamed import REMOVED, present_key
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS
@@ -116,9 +117,7 @@ def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
     try:
         return Scenario.model_validate(values)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        reason = "unknown key; see docs/scenarios.md" if first["type"] == "extra_forbidden" else first["msg"]
-        raise SweepError(f"--set {key}={value}: {reason}") from None
+        raise SweepError(f"--set {key}={value}: {faults_of(error, values)[0].words}") from None
 
 
 def cell_code_sha256() -> str:

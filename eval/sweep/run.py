@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from hippodrome._files import write_atomically
+from hippodrome._files import read_bounded, write_atomically
+from hippodrome._json import parse_json
 from hippodrome.eval.contest.entry import Added
 from hippodrome.eval.pool import progress_bar
 from hippodrome.eval.report.pages import write_trial_page
-from hippodrome.eval.results.model import Results, to_json, write_results
+from hippodrome.eval.results.model import MAX_BYTES, Results, to_json, write_results
 from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
 from hippodrome.eval.sweep.cell import CellResult, CellTask, RecordingTask, make_recording, roles_of, run_cell
 from hippodrome.eval.sweep.executors import Failure, Runner, SweepError, dask_cluster, local_processes
@@ -104,7 +104,7 @@ def _finished(cell: SweepCell, out: Path) -> CellResult | None:
 
 def _read(path: Path) -> CellResult:
     try:
-        return CellResult.model_validate(json.loads(path.read_text(encoding="utf-8")))
+        return CellResult.model_validate(parse_json(read_bounded(path, MAX_BYTES)))
     except (OSError, UnicodeDecodeError, ValueError, ValidationError, RecursionError) as error:
         raise SweepError(
             f"{path}: not a cell's result ({' '.join(str(error).split())[:100]}); delete it to run the cell again"

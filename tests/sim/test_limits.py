@@ -130,7 +130,15 @@ MERGE = "x0: &x0 {k: 1, l: 2}\n" + "".join(f"x{i}: &x{i}\n  <<: [{', '.join([f'*
     ("a: *b", r":2: not valid YAML: found undefined alias"),
     ("--- 1\n--- 2", r"not valid YAML"),
     ("seed: 1e400", r":2: seed"),
-    ("seed: 1:2:3:4:5:6:7:8:9:10:11:12:13:14", r":2: seed"),
+    ("seed: 1:2:3:4:5:6:7:8:9:10:11:12:13:14", r":2: '1:2:3.*' is another number for YAML than it looks"),
+    ("seed: 010", r":2: '010' is another number for YAML"),
+    ("mapping: {tour: {length_m: 1:30}}", r":2: '1:30' is another number for YAML"),
+    ("seed: yes", r":2: seed: Input should be a valid integer, not true"),
+    ("mapping: {tour: {length_m: on}}", r":2: mapping.tour.length_m: Input should be a valid number, not true"),
+    ("refine: {route: {solver: {along_sigma_m: [no, 1]}}}", r":2: refine.route.solver.along_sigma_m"),
+    ("seed: 1\nseed: 2", r":3: seed: given twice, first in line 2; remove one"),
+    ("missions: {rows: [ours], rows: [truth]}", r":2: missions.rows: given twice"),
+    ("description: [{a: 1, a: 2}]", r":2: description.0.a: given twice"),
 ])  # fmt: skip
 def test_every_yaml_is_a_scenario_or_one_sentence(tmp_path, text, reason):
     path = tmp_path / "a.yaml"

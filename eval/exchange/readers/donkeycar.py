@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from hippodrome._json import parse_json
 from hippodrome.eval.exchange.drives.clock import in_seconds
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignDrive, motion_table
@@ -80,9 +80,9 @@ def _records(folder: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
 
 def _json(path: Path, number: int, text: str) -> dict[str, Any]:
     try:
-        value = json.loads(text)
-    except (ValueError, RecursionError):
-        value = None
+        value = parse_json(text)
+    except (ValueError, RecursionError) as error:
+        raise ExchangeError(f"{path}: line {number}: not a JSON record: {str(error)[:80]}") from None
     if not isinstance(value, dict):
         raise ExchangeError(f"{path}: line {number}: not a JSON record")
     return value

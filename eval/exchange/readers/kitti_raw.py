@@ -14,7 +14,7 @@ from hippodrome.eval.exchange.drives.foreign import ForeignDrive, Motion, motion
 from hippodrome.eval.exchange.drives.images import file_frame
 from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.readers.pictures import image_files
-from hippodrome.eval.exchange.readers.text import read_lines
+from hippodrome.eval.exchange.readers.text import focal_length, read_lines
 
 CAMERAS: Final = ("image_02", "image_00", "image_03", "image_01")  # colour left, grey left, colour right, grey right
 LATITUDE, LONGITUDE, SPEED_FORWARD, YAW_RATE_UP = 0, 1, 8, 22  # columns of a file of oxts/data: lat, lon, vf, wu
@@ -92,6 +92,6 @@ def _focal_px(folder: Path, camera: str) -> float | None:
         return None
     words = next((line.split()[1:] for line in read_lines(path) if line.startswith(f"P_rect_{camera[-2:]}:")), [])
     try:
-        return float(words[0]) if words else None
+        return focal_length(words[0], path) if words else None
     except ValueError:
         raise ExchangeError(f"{path}: P_rect_{camera[-2:]} does not begin with a number") from None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.records import Channel, Message, Schema
 from rosbags.typesys import Stores, get_typestore
 
+from hippodrome._json import parse_json
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignDrive
@@ -126,7 +126,7 @@ def _topic(channel: Channel, schema: Schema | None) -> _Topic:
 
 def _of_json(kind: Any, data: bytes) -> Any:
     """A message of Foxglove's JSON schemas, whose fields are those of its protobuf; times are {sec, nsec} or ISO 8601."""
-    return ParseDict(_with_dates(json.loads(data)), kind(), ignore_unknown_fields=True)
+    return ParseDict(_with_dates(parse_json(data)), kind(), ignore_unknown_fields=True)
 
 
 def _with_dates(value: Any) -> Any:

@@ -59,6 +59,7 @@ def records(path: Path, reach: Reach) -> Iterator[Schema | Channel | Message]:
             opcode, length = HEAD.unpack(head) if len(head) == HEAD.size else (0, size)
             if opcode in (Opcode.DATA_END, Opcode.FOOTER):
                 _require_whole(path, opcode, stream.read(4), checksum)
+                _require_end(path, stream, at, size)
                 return
             whole = at + HEAD.size + length <= size
             if length > MAX_RECORD_BYTES and whole:
@@ -98,6 +99,28 @@ def _require_whole(path: Path, opcode: int, body: bytes, checksum: int) -> None:
     (said,) = struct.unpack("<I", body)
     if said not in (0, checksum):
         raise damaged(path, len(MAGIC), f"checksum {checksum:08x} of the data, {said:08x} stands at their end")
+
+
+def _require_end(path: Path, stream: IO[bytes], at: int, size: int) -> None:
+    """Raise ExchangeError if something follows the end of the file: a second one, of which nothing would be read.
+
+    Args:
+        path: The file, for the error.
+        stream: The same, open.
+        at: Where its end record begins; a summary may follow it, then the footer and the magic number.
+        size: Its bytes.
+    """
+    for _ in range(MAX_RECORDS):
+        stream.seek(at)
+        if len(head := stream.read(HEAD.size)) < HEAD.size:
+            return  # cut short behind the data, which are whole
+        opcode, length = HEAD.unpack(head)
+        at += HEAD.size + length
+        if opcode == Opcode.FOOTER:
+            if (more := size - at - len(MAGIC)) > 0:
+                why = "are these two files in one? cut them apart, and import each"
+                raise ExchangeError(f"{path}: {more} bytes after its end, which nobody would read; {why}")
+            return
 
 
 def damaged(path: Path, at: int, why: str) -> ExchangeError:

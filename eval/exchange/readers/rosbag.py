@@ -141,6 +141,9 @@ def _require_small_rows(file: Path) -> None:
         wrong = "SELECT rowid FROM messages WHERE typeof(data) <> 'blob' OR length(data) > ? LIMIT 1"
         if (row := database.execute(wrong, (MAX_RECORD_BYTES,)).fetchone()) is not None:
             raise ExchangeError(f"{file}: message {row[0]} is no message, or has more than {MAX_RECORD_BYTES} bytes; {CURE}")
+        (lost,) = database.execute("SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)").fetchone()
+        if lost:
+            raise ExchangeError(f"{file}: {lost} message(s) of topics that it does not describe; {CURE}")
 
 
 def _require_small_chunks(path: Path, bag: AnyReader) -> None:

@@ -23,7 +23,7 @@ from hippodrome.eval.exchange.drives.poses import Axes
 from hippodrome.eval.exchange.drives.tables import ODOMETRY
 from hippodrome.eval.exchange.readers.motion_csv import PLAIN, TIME_UNITS, columns_named, in_units, read_motion
 from hippodrome.eval.exchange.readers.pictures import image_files
-from hippodrome.eval.exchange.readers.text import inside, read_lines, read_table, read_values
+from hippodrome.eval.exchange.readers.text import focal_length, inside, read_lines, read_table, read_values
 
 KITTI_CAMERAS = ("image_2", "image_0", "image_3", "image_1")
 EUROC_ODOMETRY = Path("odometry0", "data.csv")
@@ -170,7 +170,7 @@ def _kitti_focal(path: Path) -> float | None:
     rows = {line.split(":", 1)[0]: line.split(":", 1)[1].split() for line in read_lines(path) if ":" in line}
     words = rows.get("P2") or rows.get("P0")
     try:
-        return float(words[0]) if words else None
+        return focal_length(words[0], path) if words else None
     except ValueError:
         raise ExchangeError(f"{path}: P2 does not begin with a number") from None
 
@@ -181,6 +181,6 @@ def _euroc_focal(path: Path) -> float | None:
         return None
     values = read_values(path, "\n".join(line for line in read_lines(path) if not line.startswith("%YAML")))
     try:
-        return float(values["intrinsics"][0]) if isinstance(values, dict) and "intrinsics" in values else None
+        return focal_length(values["intrinsics"][0], path) if isinstance(values, dict) and "intrinsics" in values else None
     except (ValueError, TypeError, IndexError, KeyError, OverflowError) as error:
         raise ExchangeError(f"{path}: not a sensor description ({' '.join(str(error).split())[:80]})") from None

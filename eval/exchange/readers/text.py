@@ -13,6 +13,7 @@ from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.sim.yaml_file import MAX_BYTES, ScenarioError, parse_yaml
 
 MAX_TABLE_BYTES: Final = 512 << 20
+LONGEST_FOCAL_PX: Final = 1e6  # a telescope's
 
 
 def read_table(path: Path, columns: int, separator: str | None = None, exactly: bool = False) -> FloatArray:
@@ -59,9 +60,21 @@ def read_values(path: Path, text: str) -> Any:
     if len(text) > MAX_BYTES:
         raise ExchangeError(f"{path}: {len(text)} characters of YAML, the limit is {MAX_BYTES}; it is no description of a sensor")
     try:
-        return parse_yaml(text, str(path))[1]
+        return parse_yaml(text, str(path), ours=False)[1]
     except ScenarioError as error:
         raise ExchangeError(str(error)) from None
+
+
+def focal_length(words: Any, path: Path) -> float:
+    """A focal length in pixels, as a file has it.
+
+    Raises ValueError, TypeError or OverflowError if it is no number, and ExchangeError if no camera has it: what is measured in
+    frames is divided by it.
+    """
+    focal_px = float(words)
+    if not 1.0 < focal_px < LONGEST_FOCAL_PX:
+        raise ExchangeError(f"{path}: a focal length of {focal_px:g} pixels, which no camera has; mend it, or take the file away")
+    return focal_px
 
 
 def inside(folder: Path, name: str, listed_in: Path) -> Path:

@@ -13,13 +13,15 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from hippodrome._files import write_atomically
+from hippodrome._files import read_bounded, write_atomically
+from hippodrome._json import parse_json
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
 from hippodrome.eval.contest.calls import estimates_of
 from hippodrome.eval.files.trajectories import read_tum, write_tum
 from hippodrome.eval.methods.protocol import Cost, Given, Localizes, Mapped, Maps
 from hippodrome.eval.programs.pairs import StereoDrive
 from hippodrome.eval.programs.process import ProgramEnded
+from hippodrome.eval.results.model import MAX_BYTES
 
 # Files in a run's folder. The first says why the method did not end; the next call does not try again: a crash is a result.
 CRASH, FIGURES, LIVE, FINAL, STEPS = "crash.txt", "result.json", "live.tum", "map.tum", "steps.txt"
@@ -112,7 +114,7 @@ def read_run(folder: Path, *, mapped: bool) -> Run:
     Raises:
         HippodromeError, OSError, ValueError, TypeError: A file is missing or is not what it should be.
     """
-    figures = RunFigures(**json.loads((folder / FIGURES).read_text(encoding="utf-8")))
+    figures = RunFigures(**parse_json(read_bounded(folder / FIGURES, MAX_BYTES)))
     if mapped and figures.tracked < LEAST_TRACKED * figures.frames:
         return Run(folder, f"lost: {figures.tracked} of {figures.frames} frames tracked", figures)
     run = Run(folder, None, figures, read_tum(folder / LIVE), steps=Steps(*np.loadtxt(folder / STEPS, ndmin=2).T))

@@ -21,6 +21,7 @@ from hippodrome.eval.figures.stress import draw_stress
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.pool import worker_pool
 from hippodrome.eval.report.pages import write_trial_page
+from hippodrome.eval.results.kept import read_kept
 from hippodrome.eval.results.model import to_json
 from hippodrome.eval.reuse import figure_code_sha256
 from hippodrome.eval.run import RECORD_STAGES, make_recordings
@@ -108,7 +109,7 @@ def run_cases(task: StressTask) -> list[StressRow]:
         if not file.exists():
             row = run_case(case, drive, task.rerun(case))
             write_atomically(file, to_json(asdict(row)).encode())
-        rows[case.name] = StressRow(**json.loads(file.read_text()))
+        rows[case.name] = _kept_row(file)
     return [*rows.values(), *_rows_of_methods(task, drive)]
 
 
@@ -122,8 +123,14 @@ def _rows_of_methods(task: StressTask, drive: StressedDrive) -> list[StressRow]:
             if not file.exists():
                 row = run_method(case, drive, entry, task.rerun(case, label))
                 write_atomically(file, to_json(asdict(row)).encode())
-            rows.append(StressRow(**json.loads(file.read_text())))
+            rows.append(_kept_row(file))
     return rows
+
+
+def _kept_row(file: Path) -> StressRow:
+    """A row that this run or an earlier one left. Raises ResultsError."""
+    row: StressRow = read_kept(file, StressRow, "not the row of a case", "delete it, and the same command makes it anew")
+    return row
 
 
 def applicable(scenario: Scenario) -> list[Entry]:

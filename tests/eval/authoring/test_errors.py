@@ -65,7 +65,32 @@ def test_all_errors_in_the_order_of_the_file(errors_of):
 @pytest.mark.parametrize(("text", "expected"), [
     ("name: a\n", []),
     ("seed: 1\n", ["1: name: must be given"]),
-    ("name: a\nnoise: worse\n", ["2: noise: Input should be 'clean', 'paper', 'realistic' or 'harsh', not 'worse'"]),
+    ("name: a\nnoise: worse\n", ["2: noise: Input should be 'clean', 'paper', 'realistic' or 'harsh', or keys of its own "
+                                 "(docs/scenarios.md lists them), not 'worse'"]),
+    ("name: a\nmapping: {tour: {}, closed: 5000}\n",
+     ["2: mapping.closed: Input should be a list, as in [a, b], or a number of at most 100, not 5000"]),
+    ("name: a\nmapping: {tour: {}, closed: A0A1}\n",
+     ["2: mapping.closed: Input should be a list, as in [a, b], or a whole number, not 'A0A1'"]),
+    ("name: a\nmapping: {tour: {}, closed: [a, 5]}\n",
+     ["2: mapping.closed.1: Input should be text, in quotes where it looks like a number or a word like yes, not 5"]),
+    ("name: a\nmissions: {rows: ours}\n", ["2: missions.rows: Input should be a list, as in [a, b], not 'ours'"]),
+    ("name: a\nmissions: {policies: {a: b}}\n",
+     ["2: missions.policies.a: Input should be my_package.my_module:MyPolicy, or exec: or stream: and a command, not 'b'"]),
+    ("name: a\nmethods: [a]\n", ["2: methods: Input should be names with values, as in {a: b}"]),
+    ("name: a\nmethods: {a: 5}\n",
+     ["2: methods.a: Input should be my_package.my_module:MyClass, exec: or stream: and a command, or keys of its own, not 5"]),
+    ("name: a\nmethods: {a: b}\n",
+     ["2: methods.a: Input should be my_package.my_module:MyClass, or exec: or stream: and a command, not 'b'"]),
+    ("name: a\nmethods: {a!: 'b:C'}\n",
+     ["2: methods.a!: a name begins with a letter or digit and has letters, digits, spaces and . _ + ( ) , - , at most 40, "
+      "not 'a!'"]),
+    ("name: a\nmethods: {a: {stream: b, needs: [c]}}\n",
+     ["2: methods.a.needs.0: Input should be road_network, start_pose, stereo, grain, metric_scale, or a size like 640x480, "
+      "not 'c'"]),
+    ("name: a\ntown: {network: no}\n", ["2: town.network: Input should be the path of a file, in quotes where it looks like a "
+                                       "number or a word like yes, not false"]),
+    ("name: a\nseed: 0x" + 5000 * "f" + "\n", ["2: seed: Input should be less than 2147483648"]),
+    ("name: a\nseed: yes\n", ["2: seed: Input should be a valid integer, not true"]),
     ("name: a\nseed: 1\nseed: 1\n", ["3: seed: given twice, first in line 2; remove one"]),
     ("name: a\ncamera: {rate_hz: 3}\n", ["1: odometry_rate_hz 10 is not a whole multiple of camera.rate_hz 3"]),
     ("name: a\nmapping: {tour: {}}\nzzzzzz: 1\n", ["3: zzzzzz: unknown key; docs/scenarios.md lists all"]),

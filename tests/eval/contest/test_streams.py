@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -134,7 +135,6 @@ def test_a_client_corrects_its_trajectory_in_the_end_and_localizes_in_what_it_ke
         ("import sys\nsys.stdout.buffer.write(bytes([255, 255, 255, 127]))\nsys.stdin.read()\n", "the limit is 67108864"),
         ("import os, signal\nos.kill(os.getpid(), signal.SIGABRT)\n", "signal 6 (SIGABRT)"),
         ("import sys\nsys.stdin.read()\n", "hung"),
-        ("import os, time\nos.close(1)\ntime.sleep(1000)\n", ""),  # where it has no namespace, that is seen at once
         (FRAMES + "answer(FromMethod(ready=Ready(version=1)))\nwhile True: answer(FromMethod(answer=Answer(known=True)))\n", ""),
         (FRAMES + "answer(FromMethod(ready=Ready(version=7)))\nsys.stdin.read()\n", "it speaks version 7 of the stream"),
         (FRAMES + "answer(FromMethod(answer=Answer()))\nsys.stdin.read()\n", "answered with 'answer' where 'ready'"),
@@ -145,6 +145,30 @@ def test_whatever_it_does_wrong_is_in_its_row(materials, program, text, cause):
     row = rows_of(materials, stream(program(text), time_limit_s=2.0)).rows[0]
     assert cause in row.failure
     assert row.ape is None
+
+
+CLOSED = "it closed its standard input or output, and went on"
+
+
+@pytest.mark.parametrize("text", [
+    "import os, time\nos.close(1)\ntime.sleep(1000)\n",
+    "import os, sys, time\nsys.stdin.buffer.read(10)\nos.dup2(2, 1)\ntime.sleep(1000)\n",
+    FRAMES + "answer(FromMethod(ready=Ready(version=1)))\nimport os, time\nos.close(0)\ntime.sleep(1000)\n",
+    "import os, time\nos.fork()\nos.closerange(0, 3)\ntime.sleep(1000)\n",
+])  # fmt: skip
+def test_a_client_that_closes_its_pipes_and_lives_on_is_named_at_once(materials, program, text):
+    began = time.monotonic()
+    row = rows_of(materials, stream(program(text), time_limit_s=60.0)).rows[0]
+    assert CLOSED in row.failure
+    assert time.monotonic() - began < 50.0  # a busy machine
+
+
+def test_a_client_that_hands_its_pipes_to_another_is_none_of_those(materials, program):
+    slow = (
+        "import subprocess, sys\nsubprocess.Popen(['sleep', '4'], stdin=subprocess.DEVNULL)\nimport os\nos.close(1)\nos.wait()\n"
+    )
+    row = rows_of(materials, stream(program(slow), time_limit_s=60.0)).rows[0]
+    assert CLOSED not in row.failure and "it ended before the drive did" in row.failure
 
 
 def test_a_covariance_has_nine_numbers_or_none():

@@ -166,7 +166,7 @@ def test_a_start_in_another_place_is_refused(drive, finished, tmp_path, capsys):
 
 def test_a_start_in_degrees_is_not_taken_for_metres(drive, finished, tmp_path, capsys):
     arguments = ["refine", str(finished / "semi.pbstream"), "--network", str(drive[1]), "--out", str(tmp_path / "topo.pbstream")]
-    for start in ("49.0,8.4,90", "49.4,8.1,0"):
+    for start in ("50.001,8.002,90", "50.4,8.3,0"):
         assert main([*arguments, "--start", start]) == BAD_INPUT
         said = capsys.readouterr().err
         assert "looks like latitude and longitude" in said

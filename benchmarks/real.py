@@ -5,18 +5,20 @@
 Self-motion alone is laid on the roads; start, scale and frames are not given. Four tables follow.
 
 *Drives*: the share of vertices that is vouched for, how many of these lie 10 m or more off, APE (mean) and RPE over 20 m (mean),
-NEES per dimension of what is vouched for, the accuracy that the drive shows the map to have, and the processor's seconds of the
-refinement. The truth is laid over the result by one rigid fit of the whole drive; both are those of the rear axle.
+NEES per dimension of what is vouched for, the NEES that a right covariance has (the mean, and where 90 % lie), the accuracy that
+the drive shows the map to have, and the processor's seconds of the refinement. The truth is laid over the result by one rigid fit
+of the whole drive, which makes the NEES of a right covariance less than 1; both are those of the rear axle.
 
 *Controls*: every drive in every other network, mirrored in all of them, and in its own without the streets that it drove. Nothing
 may be vouched for.
 
 *Metres*: how far each drive goes until a stretch of it is vouched for.
 
-*What roads cannot tell*: the monocular odometry errs in its scale from step to step. The rows tell it the true scale of each
+*What roads cannot tell*: the monocular odometry errs in its scale from step to step. First, the least RPE over 20 m along the
+road of a linear estimate that knows how that scale errs and is told its place by all bends of the road: if the map is as far off
+as the drive with the truth's self-motion shows it to be, and if it were better or worse. Then rows tell it the true scale of each
 step, averaged over some metres, and refine it then: what the RPE over 20 m would be if something (wheels, stereo, a camera of
-known height) told the scale as finely as that, and *by marks*, if every place of the road were a corner whose place along it is
-read off a map that is itself off. Real roads tell less, as they tell it from one corner to the next. The rows *speed* say how
+known height) told the scale as finely as that. The rows *speed* say how
 much of the steps of the scale could be told from a change of the speed that the odometry sees, as cars keep their speed.
 """
 
@@ -32,20 +34,24 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.acceptance import DrivenRoads, metres_until_vouched, mirrored, print_metres, without_driven
+from benchmarks.real_bounds import best_rpe_m, expected_nees, map_sigma_m, nees_after_fit
 from benchmarks.real_drives import ABSENT, REAL, RealDrive, read_drives, scaled
 from benchmarks.table import Row
 from hippodrome.core import se2
+from hippodrome.core.refinement.config import RouteRefineConfig
 from hippodrome.core.refinement.refine import refine
+from hippodrome.core.refinement.route import keyframe_closures, solve_route
+from hippodrome.core.refinement.solver import RouteSolution
 from hippodrome.core.roads.network import RoadNetwork
-from hippodrome.core.types import FloatArray, HippodromeError, MatchStatus
+from hippodrome.core.types import FloatArray, HippodromeError, MatchStatus, UInt8Array
 from hippodrome.eval.metrics.alignment import umeyama
 
 FAR_M = 10.0  # a vertex that is vouched for is right if it lies nearer than this to where it was
 RPE_M = 20.0
 AVERAGED_M = (5.0, 20.0, 40.0, 80.0, 160.0)  # over which the true scale is told
-MARK_SIGMA_M, MARK_LENGTH_M = 1.6, 60.0  # as KITTI 00 shows its map to be, and the correlation length that is assumed
-SEEDS = 3
-MONOCULAR = "09 mono"
+LENGTH_M = 60.0  # correlation length of a map's errors, as the refinement has it
+MONOCULAR, ITS_TRUTH = "09 mono", "09"
+SHARES = (2.0, 1.0, 0.5, 0.25)  # of the error of the map that the bound is asked for
 STEP_M = 5.0  # between keyframes
 
 
@@ -66,18 +72,19 @@ class Result:
 def refined(drive: RealDrive, network: RoadNetwork) -> Result:
     """Lay a drive on its own network."""
     began = time.process_time()
-    refinement = refine(drive.cognitive_map, network)
-    seconds, found = time.process_time() - began, refinement.cognitive_map
-    assert found.road_match is not None and found.covariance is not None
-    fit = umeyama(found.poses[:, :2], drive.true_poses[:, :2], with_scale=False)
-    off = found.poses[:, :2] @ fit.rotation.T + fit.translation_m - drive.true_poses[:, :2]
-    covariance = fit.rotation @ found.covariance[:, :2, :2] @ fit.rotation.T
-    vouched, error_m = found.road_match.status == MatchStatus.MATCHED, np.hypot(*off.T)
-    nees = np.einsum("ni,nij,nj->n", off, np.linalg.inv(covariance), off) / 2.0
+    _, solution, status = solve_route(drive.cognitive_map, network, RouteRefineConfig())
+    return figures(drive, solution, status, time.process_time() - began)
+
+
+def figures(drive: RealDrive, solution: RouteSolution, status: UInt8Array, seconds: float) -> Result:
+    """The figures of a solution, which took so many seconds."""
+    poses, true_m, vouched = solution.state.poses, drive.true_poses[:, :2], status == MatchStatus.MATCHED
+    fit = umeyama(poses[:, :2], true_m, with_scale=False)
+    error_m = np.hypot(*(poses[:, :2] @ fit.rotation.T + fit.translation_m - true_m).T)
     return Result(
-        len(found.poses), float(np.mean(vouched)), int(np.sum(vouched & (error_m >= FAR_M))), float(np.mean(error_m)),
-        rpe_m(found.poses, drive), float(np.mean(nees[vouched])) if np.any(vouched) else float("nan"),
-        refinement.estimates.get("survey_sigma_m", 0.0), seconds,
+        len(poses), float(np.mean(vouched)), int(np.sum(vouched & (error_m >= FAR_M))), float(np.mean(error_m)),
+        rpe_m(poses, drive), nees_after_fit(poses[:, :2], solution.covariance[:, :2, :2], true_m, vouched),
+        solution.shown_survey_sigma_m or 0.0, seconds,
     )  # fmt: skip
 
 
@@ -112,14 +119,9 @@ def accepted(drive: RealDrive, network: RoadNetwork) -> float:
     return float(np.mean(match.status == MatchStatus.MATCHED))
 
 
-def told_scale(drive: RealDrive, over_m: float, rng: np.random.Generator | None = None) -> RealDrive:
-    """The drive whose steps are told their true scale, averaged over some metres around them.
-
-    With ``rng`` it is told by marks at both ends of these metres, which are drawn wrong along the road by ``MARK_SIGMA_M``.
-    """
+def told_scale(drive: RealDrive, over_m: float) -> RealDrive:
+    """The drive whose steps are told their true scale, averaged over some metres around them."""
     log_scale = _true_log_scale(drive)
-    if rng is not None:
-        log_scale = log_scale + np.diff(_mark_errors_m(len(log_scale) + 1, rng)) / drive.true_steps_m
     steps = max(round(over_m / STEP_M), 1)
     kernel = np.ones(min(steps, len(log_scale)))
     mean = np.convolve(log_scale, kernel, "same") / np.convolve(np.ones_like(log_scale), kernel, "same")
@@ -133,16 +135,6 @@ def told_by_speed(drive: RealDrive, over_m: float) -> float:
     seen = np.log(np.maximum(_seen_steps(drive), 1e-3) / np.diff(drive.visits.t_s))
     changes = [(lambda a: a[steps:] - a[:-steps])(np.convolve(one, mean, "valid")) for one in (_true_log_scale(drive), seen)]
     return float(np.corrcoef(*changes)[0, 1] ** 2)
-
-
-def _mark_errors_m(count: int, rng: np.random.Generator) -> FloatArray:
-    """Errors (count,) of a map along a road, ``STEP_M`` apart: an Ornstein-Uhlenbeck process, as the refinement has it."""
-    keep = np.exp(-STEP_M / MARK_LENGTH_M)
-    error = rng.standard_normal(count)
-    for i in range(1, count):
-        error[i] = keep * error[i - 1] + np.sqrt(1.0 - keep**2) * error[i]
-    errors: FloatArray = MARK_SIGMA_M * error
-    return errors
 
 
 def _true_log_scale(drive: RealDrive) -> FloatArray:
@@ -177,12 +169,17 @@ def _rows(name: str, found: Result) -> list[Row]:
 
 def print_drives(drives: list[RealDrive], networks: dict[str, RoadNetwork]) -> None:
     """The table of the drives in their own networks."""
-    print(f"{'drive':12}{'vertices':>9}{'accepted':>9}{'wrong':>6}{'APE m':>7}{'RPE20 m':>8}{'NEES':>6}{'map m':>7}{'CPU s':>7}")
+    print(f"{'drive':12}{'vertices':>9}{'accepted':>9}{'wrong':>6}{'APE m':>7}{'RPE20 m':>8}{'NEES':>6}", end="")
+    print(f"{'a right one':>20}{'map m':>6}{'CPU s':>7}")
     for drive in drives:
-        one = refined(drive, networks[drive.sequence])
+        began = time.process_time()
+        _, solution, status = solve_route(drive.cognitive_map, networks[drive.sequence], RouteRefineConfig())
+        one, closures = figures(drive, solution, status, time.process_time() - began), keyframe_closures(drive.cognitive_map)
+        vouched = status == MatchStatus.MATCHED
+        right, low, high = expected_nees(solution, closures, drive.true_poses[:, :2], vouched, np.random.default_rng(0))
         print(
             f"{drive.name:12}{one.vertices:9}{one.accepted:9.3f}{one.wrong:6}{one.ape_m:7.2f}{one.rpe_m:8.3f}"
-            f"{one.nees:6.2f}{one.map_sigma_m:7.2f}{one.seconds:7.1f}",
+            f"{one.nees:6.2f}{right:7.2f} ({low:.2f}-{high:.2f}){one.map_sigma_m:6.2f}{one.seconds:7.1f}",
             flush=True,
         )
 
@@ -211,14 +208,21 @@ def until_vouched(drives: list[RealDrive], networks: dict[str, RoadNetwork]) -> 
     return np.array(metres)
 
 
+def print_best(drive: RealDrive, exact: RealDrive, network: RoadNetwork) -> None:
+    """The least RPE along the road that the odometry of a drive and all bends of its roads allow; ``exact`` is its truth's."""
+    line, solution, _ = solve_route(exact.cognitive_map, network, RouteRefineConfig())
+    off_m, log_scale = map_sigma_m(exact, solution, line, LENGTH_M), _true_log_scale(drive)
+    print(f"\nKITTI {drive.name}: least RPE20 m along the road of a linear estimate, by all its bends, if it is drawn off by")
+    for share in SHARES:
+        least_m = best_rpe_m(drive, log_scale, share * off_m, LENGTH_M, RPE_M)
+        print(f"{share * off_m:8.2f} m{' (as it is)' if share == 1.0 else '':12}{least_m:10.3f}", flush=True)
+
+
 def print_bounds(drive: RealDrive, network: RoadNetwork) -> None:
     """What the RPE would be if the odometry's scale were told, and what the speed tells of it."""
     print(f"\nKITTI {drive.name}, RPE20 m: {refined(drive, network).rpe_m:.3f} m; told its true scale, averaged over")
-    print(f"{'':8}{'exactly':>10}{'by marks':>10}")
     for over_m in AVERAGED_M[::-1]:
-        exactly = refined(told_scale(drive, over_m), network).rpe_m
-        marks = [refined(told_scale(drive, over_m, np.random.default_rng(seed)), network).rpe_m for seed in range(SEEDS)]
-        print(f"{over_m:6.0f} m{exactly:10.3f}{np.mean(marks):10.3f}", flush=True)
+        print(f"{over_m:6.0f} m{refined(told_scale(drive, over_m), network).rpe_m:10.3f}", flush=True)
     for over_m in AVERAGED_M[1:3]:
         print(f"speed, changes over {over_m:.0f} m, explains {told_by_speed(drive, over_m):.1%} of those of the scale")
 
@@ -239,9 +243,11 @@ def main(arguments: list[str]) -> int:
     print_drives(drives, networks)
     print_controls(drives, networks)
     print_metres(until_vouched(drives, networks))
-    for drive in drives:
-        if drive.name == MONOCULAR:
-            print_bounds(drive, networks[drive.sequence])
+    named = {drive.name: drive for drive in drives}
+    if MONOCULAR in named and ITS_TRUTH in named:
+        network = networks[named[MONOCULAR].sequence]
+        print_best(named[MONOCULAR], named[ITS_TRUTH], network)
+        print_bounds(named[MONOCULAR], network)
     return 0
 
 

@@ -39,7 +39,15 @@ from hippodrome.core.types import (
 def refine_route(
     cognitive_map: CognitiveMap, network: RoadNetwork, config: RouteRefineConfig, start: StartPose | None = None
 ) -> Refinement:
-    """The topometric map in mode ``route``, from an unknown start unless one is given.
+    """The topometric map in mode ``route``, from an unknown start unless one is given."""
+    line, solution, status = solve_route(cognitive_map, network, config, start)
+    return _refinement(cognitive_map, network, line, solution, status)
+
+
+def solve_route(
+    cognitive_map: CognitiveMap, network: RoadNetwork, config: RouteRefineConfig, start: StartPose | None = None
+) -> tuple[RouteLine, RouteSolution, UInt8Array]:
+    """The route's line, the solution for S keyframes along it, and the MatchStatus (S,) of each.
 
     Headings alone do not tell parallel lanes apart. Where the route has such lanes, a first refinement leaves the keyframes free
     to lie on any of them; the lanes are then chosen from its metric poses, and a second one holds the keyframes on those.
@@ -67,7 +75,7 @@ def refine_route(
     status = reject_displaced(status, route, solution.state.drawn_points_m, config.confidence)
     status = reject_doubtful(status, route, solution.state.drawn_points_m, config.confidence)
     status = reject_uncertain(status, solution.assumed_covariance[:, :2, :2], config.confidence)
-    return _refinement(cognitive_map, network, line, solution, status)
+    return line, solution, status
 
 
 def _line_and_places(route: Route, network: RoadNetwork) -> tuple[RouteLine, FloatArray]:

@@ -44,6 +44,7 @@ class RouteSolution:
     noise: Noise
     covariance: FloatArray  # (S, 4, 4) x, y, heading, log scale; (S, 6, 6) with the error of the map
     assumed_covariance: FloatArray  # the same if the map is as accurate as was assumed, not as the drive has shown it to be
+    factors: Factors  # what the covariance was made of, at the solution
     shown_survey_sigma_m: float | None = None  # how accurate the drive has shown the map to be; None: it was not asked
 
 
@@ -119,10 +120,11 @@ def _refined(
     if map_error is not None and config.survey_freedom is not None:
         shown_m = shown_sigma_m(map_error, config.survey_freedom, state, assumed, noise, visits)
         shown = map_error_factors(state, visits, closures, replace(map_error, sigma_m=shown_m))
-        covariance = covariance_under_map_error(state, factors._replace(map_error=shown), closures)
+        factors = factors._replace(map_error=shown)
+        covariance = covariance_under_map_error(state, factors, closures)
     was_read = None if targets.read is None else np.isfinite(targets.read.across_sigma_m)
     told, as_assumed = (with_systematic_errors(one, was_read) for one in (covariance, assumed))
-    return RouteSolution(state, arc_m, noise, told, as_assumed, shown_survey_sigma_m=shown_m)
+    return RouteSolution(state, arc_m, noise, told, as_assumed, factors, shown_survey_sigma_m=shown_m)
 
 
 def prior_scale_step_variance(state: State, visits: Visits, noise: Noise) -> FloatArray:

@@ -35,13 +35,14 @@ from hippodrome.eval.methods.method import RefineMode
 from hippodrome.eval.methods.refusal import refusal_note
 from hippodrome.proto.codec import load_map, save_map
 from hippodrome.sim.geo_start import GeoStart
-from hippodrome.sim.georeference import placed_start
+from hippodrome.sim.georeference import GeoReferenceError, is_georeferenced, placed_start, read_georeference
 from hippodrome.sim.map_import import sumo_network
 from hippodrome.sim.network import junction_gaps, read_network
 from hippodrome.sim.recording import open_recording
 from hippodrome.sim.scenario import Scenario, load_scenario
 
 FARTHEST_START_M = 1_000.0  # from the nearest road; a car park or a yard is nearer
+FARTHEST_DEGREES_M = 100_000.0  # metres that are read as degrees lie so near to a network by chance in one of its square metres
 MapT_co = TypeVar("MapT_co", covariant=True)
 ResultT = TypeVar("ResultT")
 ArgumentsP = ParamSpec("ArgumentsP")
@@ -152,6 +153,8 @@ def refine_files(
     net_file = network_file(network, out.parent)
     known_start = placed_start(start, net_file, mode)
     roads = _read_lanes(net_file)
+    if isinstance(start, StartPose):
+        _require_metres(start, roads, net_file)
     if known_start is not None:
         _require_start_near(known_start, roads, net_file)
     refinement, cpu_s = timed(refine, cognitive_map, roads, config, known_start)
@@ -168,6 +171,23 @@ def refine_files(
     if (warning := refusal_note(refinement.cognitive_map)) is not None:
         print(f"{out}: {warning}")
     return refinement
+
+
+def _require_metres(start: StartPose, roads: RoadNetwork, net_file: Path) -> None:
+    """Raise HippodromeError if x and y of a start are the latitude and longitude of a place about the network."""
+    if abs(start.x_m) > 90.0 or abs(start.y_m) > 180.0 or not is_georeferenced(net_file):
+        return
+    try:
+        place_m = read_georeference(net_file).to_network(np.array([start.x_m]), np.array([start.y_m]))
+    except GeoReferenceError:
+        return
+    away_m = float(np.hypot(*(roads.points_m - place_m).T).min())
+    if away_m <= FARTHEST_DEGREES_M:
+        place = f"{start.x_m},{start.y_m}"
+        raise HippodromeError(
+            f"--start: {place} looks like latitude and longitude, {away_m / 1e3:.1f} km from the nearest road of {net_file}; "
+            f"give geo:{place}, or geo:{place},{np.degrees(start.heading_rad):g} with a compass's heading, or x and y in metres"
+        )
 
 
 def _require_start_near(start: StartPose, roads: RoadNetwork, net_file: Path) -> None:

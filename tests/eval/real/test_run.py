@@ -164,6 +164,15 @@ def test_a_start_in_another_place_is_refused(drive, finished, tmp_path, capsys):
         assert "km from the nearest road" in capsys.readouterr().err
 
 
+def test_a_start_in_degrees_is_not_taken_for_metres(drive, finished, tmp_path, capsys):
+    arguments = ["refine", str(finished / "semi.pbstream"), "--network", str(drive[1]), "--out", str(tmp_path / "topo.pbstream")]
+    for start in ("50.001,8.002,90", "50.4,8.3,0"):
+        assert main([*arguments, "--start", start]) == BAD_INPUT
+        said = capsys.readouterr().err
+        assert "looks like latitude and longitude" in said
+        assert f"geo:{start} with" in said
+
+
 def test_a_folder_of_other_things_is_left_alone(drive, tmp_path, capsys):
     (tmp_path / "mine.txt").write_text("mine")
     assert main(["run", str(drive[0]), "--network", str(drive[1]), "--out", str(tmp_path)]) == BAD_INPUT

@@ -20,6 +20,7 @@ from hippodrome.sim.recording import Recording
 FRAMES: Final = 6  # shown, evenly over the drive
 FRAME_PX: Final = 480  # width of a frame on the page
 JPEG_QUALITY: Final = 75
+STATISTICS: Final = ("mean (m)", "median (m)", "p95 (m)", "max (m)", "samples")  # of a line of `hippodrome score`
 STYLE: Final = """
 .drive-map { width: 100%; height: auto; max-height: 80vh; display: block; border: 1px solid var(--line); border-radius: 10px;
   background: var(--panel); }
@@ -207,14 +208,23 @@ def _is_about(definition: str, words: tuple[str, ...]) -> bool:
     return all(word in definition for word in words)
 
 
+def _statistics(numbers: str) -> list[str]:
+    """The figures of a line of `hippodrome score`, one for each of ``STATISTICS``; "-" for one that it does not have."""
+    parts = [part.removesuffix(" m") for part in numbers.split(", ")]
+    named = dict(part.rsplit(" ", 1) for part in parts if " of " not in part and " " in part)
+    counted = next((part.removesuffix(" samples") for part in parts if " of " in part), "-")
+    return [*(named.get(head.removesuffix(" (m)"), "-") for head in STATISTICS[:-1]), counted]
+
+
 def _figures(scores: tuple[str, ...]) -> Html:
     rows = [
-        element("tr", element("td", numbers), element("td", definition))
+        element("tr", element("th", definition.partition(";")[0]), [element("td", figure) for figure in _statistics(numbers)],
+                element("td", definition.partition("; ")[2]))
         for numbers, definition in map(_parted, scores)
         if definition
-    ]
+    ]  # fmt: skip
     words = [element("p", f"{line[:1].upper()}{line[1:]}", class_="note") for line in scores if not _parted(line)[1]]
-    heads = element("tr", element("th", "error"), element("th", "what is measured"))
+    heads = element("tr", [element("th", word) for word in ("error", *STATISTICS, "how it is measured")])
     table = element("table", element("thead", heads), element("tbody", rows), class_="words", aria_label="figures")
     return joined(element("div", table, class_="scroll") if rows else "", words)
 

@@ -210,10 +210,11 @@ def _is_about(definition: str, words: tuple[str, ...]) -> bool:
 
 def _statistics(numbers: str) -> list[str]:
     """The figures of a line of `hippodrome score`, one for each of ``STATISTICS``; "-" for one that it does not have."""
-    parts = [part.removesuffix(" m") for part in numbers.split(", ")]
-    named = dict(part.rsplit(" ", 1) for part in parts if " of " not in part and " " in part)
-    counted = next((part.removesuffix(" samples") for part in parts if " of " in part), "-")
-    return [*(named.get(head.removesuffix(" (m)"), "-") for head in STATISTICS[:-1]), counted]
+    names = [head.removesuffix(" (m)") for head in STATISTICS[:-1]]
+    parts = [part.removesuffix(" m").rsplit(" ", 1) for part in numbers.split(", ")]
+    named = {part[0]: part[-1] for part in parts if part[0] in names}
+    rest = ", ".join(" ".join(part) for part in parts if part[0] not in names)
+    return [*(named.get(name, "-") for name in names), rest.removesuffix(" samples") or "-"]
 
 
 def _figures(scores: tuple[str, ...]) -> Html:

@@ -172,9 +172,9 @@ def _tile(row: Row, colours: Mapping[str, str]) -> Html:
 
 
 def _undrawn(scenario: ScenarioResult, colours: Mapping[str, str]) -> Html | None:
-    """Which methods have no colour, as they would cover another; None if the maps show all, or there is no map."""
+    """Which methods have no colour, as maps do not show them; None if they show all, or there is no map."""
     names = [row.method for row in reversed(scenario.rows) if row.ape is not None and row.method not in colours]
-    words = f"Not drawn on maps and in figures (the ring without a colour), as it would cover another: {'; '.join(names)}."
+    words = f"A ring without a colour: maps and figures do not show {'; '.join(names)}."
     return element("p", words, class_="note") if names and colours else None
 
 

@@ -15,6 +15,7 @@ from hippodrome.eval.real.drive import MAX_ROWS, NEXT, WORDS, Drive, marks, stat
 from hippodrome.eval.real.findings_file import place_words
 from hippodrome.eval.report.markup import Html, element, joined
 from hippodrome.eval.report.pages import page
+from hippodrome.eval.report.tables import scrolling
 from hippodrome.sim.recording import Recording
 
 FRAMES: Final = 6  # shown, evenly over the drive
@@ -36,6 +37,7 @@ STYLE: Final = """
 .frames { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 20rem), 1fr)); gap: 1rem; }
 .frames figure { margin: 0; } .frames img { width: 100%; height: auto; display: block; border-radius: 6px; }
 .words td { white-space: normal; text-align: left; min-width: 8rem; } .words th { text-align: left; }
+[aria-label="figures"] :is(th, td):last-child { text-align: left; white-space: normal; min-width: 18rem; }
 @media (max-width: 40rem) {
   .drive-map text { font-size: calc(34 * var(--pixel)); }
   .words thead { display: none; } .words tr { display: block; padding: 0.4rem 0; border-bottom: 1px solid var(--line); }
@@ -226,8 +228,8 @@ def _figures(scores: tuple[str, ...]) -> Html:
     ]  # fmt: skip
     words = [element("p", f"{line[:1].upper()}{line[1:]}", class_="note") for line in scores if not _parted(line)[1]]
     heads = element("tr", [element("th", word) for word in ("error", *STATISTICS, "how it is measured")])
-    table = element("table", element("thead", heads), element("tbody", rows), class_="words", aria_label="figures")
-    return joined(element("div", table, class_="scroll") if rows else "", words)
+    table = element("table", element("thead", heads), element("tbody", rows))
+    return joined(scrolling(table, "figures") if rows else "", words)
 
 
 def _said(drive: Drive) -> Html:

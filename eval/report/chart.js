@@ -36,7 +36,7 @@ function makeChart(canvas, story) {
       if (i % 2) { on.fillStyle = inks.panel; on.fillRect(X(one.s0), CHART_TOP, X(one.s1) - X(one.s0), size.h - CHART_TOP - CHART_BOTTOM); }
       on.fillStyle = inks.soft;
       const words = partWords(one), room = X(one.s1) - X(one.s0);
-      const fitting = [words, words.match(/^\d?/)[0]].find((text) => on.measureText(text).width < room - 4);
+      const fitting = [words, words.split(" ", 2).join(" "), words.match(/^\d?/)[0]].find((text) => on.measureText(text).width < room - 4);
       if (fitting) on.fillText(fitting, X(one.s0) + 3, 8);
       seconds(on, one);
     });

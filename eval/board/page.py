@@ -34,7 +34,12 @@ for (const table of document.querySelectorAll('table')) {
   }));
 }
 """
+SEVERAL: Final = (
+    " Columns of one scenario's name are of different drives, as something was set otherwise; the letters behind the name are "
+    "the begin of the hash of what was set."
+)
 STYLE: Final = """
+tbody :is(th, td) { vertical-align: top; }
 td details { margin: 0; text-align: left; white-space: normal; max-width: 26rem; margin-left: auto; }
 td summary { margin-left: auto; white-space: nowrap; } td small { display: block; }
 """
@@ -65,6 +70,7 @@ def board_html(made: Sequence[Table], names: Sequence[str]) -> str:
         "A click on a heading sorts by its column. A cell opens to show its definition, its spread, where it is from and the "
         "command that makes it again."
     )
+    lede += SEVERAL if any(_is_twice(drive, _shown(table)) for table in made for drive in table.drives) else ""
     body = element(
         "body",
         element("header", element("h1", "Methods x scenarios"), element("p", lede), element("nav", links)),
@@ -87,7 +93,7 @@ def board_html(made: Sequence[Table], names: Sequence[str]) -> str:
 
 def _table(table: Table) -> Html:
     """Lines of one method that have different definitions are told apart by a number."""
-    shown = [drive for drive in table.drives if any(drive in line for line in table.lines.values())]
+    shown = _shown(table)
     head = element("tr", _sorter("Method", scope="col"), [_heading(drive, shown) for drive in shown])
     rows, count = [], dict[str, int]()
     several = {method for method, _ in table.lines if sum(other == method for other, _ in table.lines) > 1}
@@ -99,10 +105,18 @@ def _table(table: Table) -> Html:
     return scrolling(element("table", element("thead", head), element("tbody", rows)), table.figure.title)
 
 
+def _shown(table: Table) -> list[Drive]:
+    """The drives of which the table has a figure."""
+    return [drive for drive in table.drives if any(drive in line for line in table.lines.values())]
+
+
+def _is_twice(drive: Drive, shown: Sequence[Drive]) -> bool:
+    return sum(other.name == drive.name for other in shown) > 1
+
+
 def _heading(drive: Drive, shown: Sequence[Drive]) -> Html:
     """The scenario's name; with its hash where another drive has the same."""
-    twice = sum(other.name == drive.name for other in shown) > 1
-    words = joined(drive.name, element("small", f" {drive.asked[:6]}") if twice else None)
+    words = joined(drive.name, element("small", f" {drive.asked[:6]}") if _is_twice(drive, shown) else None)
     return _sorter(words, scope="col", title=drive.asked)
 
 

@@ -6,7 +6,9 @@ import argparse
 import inspect
 import math
 import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -15,6 +17,7 @@ from hippodrome.core.types import StartPose
 from hippodrome.sim.geo_start import GeoStart
 from hippodrome.sim.renamed import present_value
 
+LEAST_WORDS: Final = 20  # columns that words need beside a name
 MAX_SEED: Final = 2**31 - 1
 DONE, THRESHOLD_FAILED, BAD_INPUT, OUR_FAULT, INTERRUPTED = 0, 1, 2, 70, 130
 
@@ -99,6 +102,15 @@ def print_help(parser: argparse.ArgumentParser) -> Command:
         return BAD_INPUT
 
     return run
+
+
+def print_listed(names: str, words: str) -> None:
+    """Print a line of a list. In a terminal words that do not fit go on below themselves; elsewhere a line stays one."""
+    line = f"{names} {words}".rstrip()
+    width = shutil.get_terminal_size().columns
+    beside = width - len(names) > LEAST_WORDS
+    indent = " " * (len(names) + 1 if beside else 4)
+    print(textwrap.fill(line, width, subsequent_indent=indent, break_on_hyphens=False) if sys.stdout.isatty() else line)
 
 
 def add_scenarios(parser: argparse.ArgumentParser, several: bool) -> None:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, add_command, add_group, positive_number
+from hippodrome.eval.commands.arguments import BAD_INPUT, DONE, add_command, add_group, positive_number, print_listed
 
 
 def add_scenario_command(commands: Any) -> None:
@@ -141,7 +141,7 @@ def _list_scenarios(_: argparse.Namespace) -> int:
     from hippodrome.eval.files.shipped import names
 
     for name, comment in names():
-        print(f"{name:<22} {comment}".rstrip())
+        print_listed(f"{name:<22}", comment)
     return DONE
 
 

@@ -23,7 +23,8 @@ def add_gate_commands(commands: Any) -> None:
         Exits with 1 if a limit of a scenario does not hold, if a row fails, a drive is lost or a figure is missing that was not
         before, or if an error is worse than the baseline's and that is not chance: a paired test over scenarios and seeds
         decides. Exits with 3 if an error may be worse and the pairs are too few to tell; it says how many would. Prints what
-        moved. With --update the run becomes the baseline instead. docs/authoring.md says what the gate catches.""",
+        moved, and writes it as a page, DIR/gate.html. With --update the run becomes the baseline instead. docs/authoring.md says
+        what the gate catches.""",
         ["hippodrome gate my-town.yaml --update",
          "hippodrome gate my-town.yaml --junit gate.xml",
          "hippodrome gate --power --baseline scenarios/baseline.json"],

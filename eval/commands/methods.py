@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_group, add_out
+from hippodrome.eval.commands.arguments import DONE, THRESHOLD_FAILED, add_command, add_group, add_out, print_listed
 
 
 def add_method_commands(commands: Any) -> None:
@@ -44,7 +44,8 @@ def add_method_commands(commands: Any) -> None:
 def _list(_: argparse.Namespace) -> int:
     from hippodrome.eval.contest.check import list_lines
 
-    print("\n".join(list_lines()))
+    for names, words in list_lines():
+        print_listed(names, words)
     return DONE
 
 

@@ -26,7 +26,7 @@ def add_sweep_command(commands: Any) -> None:
 
         Each combination is a cell and is scored as by `hippodrome eval`. Finished cells are kept: the same command runs what was
         interrupted, and what failed. Writes DIR/results.json, and DIR/table.md with one row for each setting and method, over the
-        samples of all its runs together. docs/sweeps.md tells the rest.
+        samples of all its runs together; DIR/sweep.html shows the same as a page. docs/sweeps.md tells the rest.
 
         Exits with 1 if a cell has no result; the others go on, and the list at the end names it with its cause.""",
         ["hippodrome sweep scenarios/towns/grid.yaml --seeds 1 2 3 --set noise=paper,harsh",

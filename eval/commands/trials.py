@@ -40,7 +40,8 @@ def add_trial_commands(commands: Any) -> None:
 
         Cases are: noisier self-motion, false loop closures, a survey error of the road network, missing roads, another town's
         network, and a town whose blocks are all alike. Writes DIR/stress.json (every row with the command that runs it again),
-        DIR/stress.md (mean, percentiles and worst case of each case) and DIR/stress.png, and prints the table.""",
+        DIR/stress.md (mean, percentiles and worst case of each case) and DIR/stress.png, shows all of
+        it on a page, DIR/stress.html, and prints the table.""",
         ["hippodrome stress scenarios/towns/grid.yaml --seeds 1 2",
          "hippodrome stress scenarios/towns/grid.yaml --case harsh --case 'missing roads'"],
     )  # fmt: skip
@@ -67,8 +68,8 @@ def add_trial_commands(commands: Any) -> None:
 
         Each condition changes one thing: light, weather, season, traffic, the camera, or the self-motion. Place recognition
         alone, kidnapping in mid-drive, a drive in another town and the paper's ten lengths are tried too. Writes robustness.json,
-        .md and .png (a heat map) and places.png into DIR/NAME for each town and, if there are several towns, all of them pooled
-        into DIR, and prints the tables.""",
+        .md, .html (a page of it all), .png (a heat map) and places.png into DIR/NAME for each town and, if there are several,
+        pooled into DIR, and prints the tables.""",
         ["hippodrome robustness scenarios/towns/grid.yaml",
          "hippodrome robustness scenarios/towns/grid.yaml --conditions same winter --sequences 3 --modes coupled kalman",
          "hippodrome robustness scenarios/towns/grid.yaml --conditions winter --start 5"],

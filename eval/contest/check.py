@@ -49,11 +49,11 @@ class Finding:
         return f"{'ok  ' if self.good else 'FAIL'} {self.text}"
 
 
-def list_lines() -> list[str]:
-    """What ``method list`` prints: ours, and those that installed packages make known."""
-    lines = [f"{cls.card.key:<18} {cls.card.label:<28} {cls.needs.in_words()}" for cls in BUILT_IN]
-    lines += [f"{OrbSlam3.card.key:<18} {OrbSlam3.label:<28} {OrbSlam3.needs.in_words()}; --method {OrbSlam3.label}"]
-    lines += [f"{point.name:<18} {point.value:<28} installed: --method {point.name}" for point in entry_points(group=GROUP)]
+def list_lines() -> list[tuple[str, str]]:
+    """What ``method list`` prints: names and words of ours, and of those that installed packages make known."""
+    lines = [(f"{cls.card.key:<18} {cls.card.label:<28}", cls.needs.in_words()) for cls in BUILT_IN]
+    lines += [(f"{OrbSlam3.card.key:<18} {OrbSlam3.label:<28}", f"{OrbSlam3.needs.in_words()}; --method {OrbSlam3.label}")]
+    lines += [(f"{point.name:<18} {point.value:<28}", f"installed: --method {point.name}") for point in entry_points(group=GROUP)]
     return lines
 
 

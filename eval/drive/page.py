@@ -33,9 +33,11 @@ LEGEND: Final = (
 STYLE: Final = """
 .roads-map { width: 100%; height: auto; max-height: 75vh; display: block; border: 1px solid var(--line); border-radius: 10px; }
 .roads-map .road { fill: none; stroke: var(--road); stroke-width: 3; stroke-linecap: round; }
-.roads-map .way { fill: none; stroke-width: 1.3; } .roads-map .lost { stroke-dasharray: 3 3; }
-.roads-map .one { opacity: .45; } .roads-map .chosen { opacity: 1; }
+.roads-map .way { fill: none; stroke-width: 1.6; } .roads-map .lost { stroke-dasharray: 3 3; }
+.roads-map .one { opacity: .6; } .roads-map .chosen { opacity: 1; }
 .roads-map .car { fill: var(--ink); } .roads-map .belief { fill: none; stroke: var(--ink); stroke-width: 1; }
+@media (prefers-color-scheme: dark) { .roads-map .ways { filter: brightness(1.7); } }
+main > section:first-child { margin-top: 1rem; }
 .words { margin-top: 1rem; } .words td { white-space: normal; min-width: 8em; } .words td:nth-child(9) { min-width: 16em; }
 .words td, .words thead th { text-align: left; }
 .drive-controls { display: flex; flex-wrap: wrap; gap: .5rem 1rem; align-items: center; margin: .5rem 0; }

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hippodrome.core.types import FloatArray
-from hippodrome.eval.figures.style import FLOOR_M, SERIES, Axes, log_errors, new_figure, save_figure, tidy
+from hippodrome.eval.figures.style import FLOOR_M, Axes, coloured, legend_of, log_errors, new_figure, save_figure, tidy
 from hippodrome.eval.metrics.trajectory import Score
 
 VIOLIN_GRID = 200
@@ -27,13 +27,13 @@ def draw_error_profiles(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, 
     figure = new_figure(9.0, 5.6)
     panels = figure.subplots(2, 1, sharex=True)
     for axes, scores, name in zip(panels, (ape, rpe), ("APE", "RPE"), strict=True):
-        for place, ((method, score), colour) in enumerate(zip(scores.items(), SERIES, strict=False)):
+        for place, ((method, score), colour) in enumerate(coloured(scores.items())):
             look = {"color": colour, "linewidth": max(3.0 - place, 0.8), "label": f"{method}: mean {score.mean_m:.2f} m"}
             axes.plot(score.t_s, np.maximum(score.errors_m, FLOOR_M), **look)
         tidy(axes, "", f"{name} (m)", title if name == "APE" else "")
         log_errors(axes, _together(scores))
         if scores:
-            axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
+            axes.legend(*legend_of(axes), loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
     panels[1].set_xlabel("time (s)")
     save_figure(figure, path, for_print=True)
 
@@ -46,10 +46,10 @@ def draw_error_violins(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, S
     methods = max(len(ape), len(rpe), 1)
     figure = new_figure(2.4 + 2.2 * methods, 4.4)
     for axes, scores, name in zip(figure.subplots(1, 2), (ape, rpe), ("APE", "RPE"), strict=True):
-        for place, (score, colour) in enumerate(zip(scores.values(), SERIES, strict=False)):
+        for place, (score, colour) in enumerate(reversed(coloured(scores.values()))):  # the last one first, as in the tables
             _violin(axes, place, score.errors_m, colour)
         tidy(axes, "", f"{name} (m)", title if name == "APE" else "box: quartiles, line: median, diamond and number: mean")
-        axes.set_xticks(range(len(scores)), [method.replace(" ", "\n", 1) for method in scores], fontsize=8)
+        axes.set_xticks(range(len(scores)), [method.replace(" ", "\n", 1) for method in reversed(list(scores))], fontsize=8)
         axes.set_xlim(-0.6, len(scores) - 0.4)
         log_errors(axes, _together(scores))
     save_figure(figure, path, for_print=True)

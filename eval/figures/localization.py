@@ -15,10 +15,10 @@ from hippodrome.eval.figures.style import (
     FAINT,
     FLOOR_M,
     GREEN,
-    SERIES,
     TRUTH,
     VERMILION,
     Axes,
+    coloured,
     log_errors,
     new_figure,
     save_figure,
@@ -61,18 +61,23 @@ def draw_localization_error(
     save_figure(figure, path, for_print=True)
 
 
-def draw_localization_comparison(path: Path, scores: Mapping[str, LocalizationScore], title: str = "") -> None:
+def draw_localization_comparison(
+    path: Path, scores: Mapping[str, LocalizationScore], title: str = "", order: Sequence[str] = ()
+) -> None:
     """Position error of several methods over the same time, where each declared itself localized, with a mark at its first fix.
 
     Args:
         path: The picture.
         scores: Score by label of the method, at least one.
         title: Stands above the figure.
+        order: Labels of methods in the order of the colours, where other figures show more methods; others follow.
     """
     figure = new_figure(9.0, 3.6)
     axes = figure.subplots()
+    colours = dict(coloured(dict.fromkeys([*order, *scores])))
     start_s = min(score.t_s[0] for score in scores.values())
-    for (method, score), colour in zip(scores.items(), SERIES, strict=False):
+    for method, score in scores.items():
+        colour = colours[method]
         vouched_m = np.where(score.localized, np.maximum(score.errors_m, FLOOR_M), np.nan)
         mean = "never localized" if score.error_mean_m is None else f"mean {score.error_mean_m:.2f} m"
         axes.plot(score.t_s - start_s, vouched_m, color=colour, linewidth=1.2, label=f"{method}: {mean}")

@@ -18,12 +18,12 @@ from hippodrome.eval.figures.style import (
     ERROR_MAP,
     ORANGE,
     ROAD,
-    SERIES,
     TRUTH,
     VERMILION,
-    Axes,
+    coloured,
     draw_network,
     frame_map,
+    legend_of,
     new_figure,
     save_figure,
 )
@@ -50,11 +50,11 @@ def draw_maps_over_truth(
     draw_network(axes, network, truth_m)
     axes.plot(truth_m[:, 0], truth_m[:, 1], color=TRUTH, linewidth=0.9, label="ground truth", zorder=2.5)
     sizes = np.linspace(*DOT_SIZES, len(maps_m))  # good maps cover one another, so smaller dots of later ones leave a rim
-    for (name, positions_m), colour, size in zip(maps_m.items(), SERIES, sizes, strict=False):
+    for ((name, positions_m), colour), size in zip(coloured(maps_m.items()), sizes, strict=True):
         axes.plot(positions_m[:, 0], positions_m[:, 1], ".", color=colour, markersize=size, alpha=0.8, label=name, zorder=3)
     axes.autoscale_view()
     axes.set_title(title, loc="left", fontsize=10)
-    _legend_below(figure, axes)
+    _legend_below(figure, *legend_of(axes, first=1))
     save_figure(figure, path, for_print=True)
 
 
@@ -77,7 +77,7 @@ def draw_cognitive_map(path: Path, cognitive_map: CognitiveMap, title: str = "")
         axes.plot(*positions[0], "*", color=VERMILION, markeredgecolor="white", markersize=14, label="start", zorder=3)
     frame_map(axes, f"x ({unit})", f"y ({unit})")
     axes.set_title(title, loc="left", fontsize=10)
-    _legend_below(figure, axes)
+    _legend_below(figure, *axes.get_legend_handles_labels())
     save_figure(figure, path, for_print=True)
 
 
@@ -117,8 +117,8 @@ def draw_error_map(
     save_figure(figure, path, for_print=True)
 
 
-def _legend_below(figure: Any, axes: Axes) -> None:
+def _legend_below(figure: Any, lines: list[Any], names: list[str]) -> None:
     """A legend below the map, where it hides no road."""
-    legend = figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    legend = figure.legend(lines, names, loc="outside lower center", ncols=4, frameon=False)
     for handle in legend.get_lines():
         handle.set_markersize(LEGEND_SIZE)  # however small the dots are in the map, their colour must be seen here

@@ -5,9 +5,11 @@ No figure uses matplotlib's global state, and the same data give the same bytes.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from io import BytesIO
+from itertools import cycle
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 from matplotlib import rc_context
@@ -20,6 +22,7 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, IntArray
 
 Axes: TypeAlias = Any  # matplotlib ships no types
+Item = TypeVar("Item")
 
 ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
     "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7",
@@ -38,6 +41,22 @@ WHOLE_ACROSS_M: Final = 50e3  # nor one that is wider: its parts lie far from ea
 AROUND_M: Final = 300.0  # of it, lanes this far around a drive are drawn
 AROUND_SHARE: Final = 0.25  # or this share of the drive's larger extent, if that is more
 FLOOR_M = 0.01  # where logarithmic error axes begin
+
+
+def coloured(methods: Iterable[Item]) -> list[tuple[Item, str]]:
+    """Methods with their colours; from the eighth on, colours come again, as they do on the page."""
+    return list(zip(methods, cycle(SERIES), strict=False))
+
+
+def legend_of(axes: Axes, first: int = 0) -> tuple[list[Any], list[str]]:
+    """Lines and names of a legend in the order of the tables, where the last method comes first, as it is what a run is about.
+
+    Args:
+        axes: What was drawn.
+        first: How many lines are of no method, and stay in front.
+    """
+    lines, names = axes.get_legend_handles_labels()
+    return lines[:first] + lines[first:][::-1], names[:first] + names[first:][::-1]
 
 
 def new_figure(width_in: float, height_in: float) -> Any:

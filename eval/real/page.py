@@ -15,11 +15,13 @@ from hippodrome.eval.real.drive import MAX_ROWS, NEXT, WORDS, Drive, marks, stat
 from hippodrome.eval.real.findings_file import place_words
 from hippodrome.eval.report.markup import Html, element, joined
 from hippodrome.eval.report.pages import page
+from hippodrome.eval.report.tables import scrolling
 from hippodrome.sim.recording import Recording
 
 FRAMES: Final = 6  # shown, evenly over the drive
 FRAME_PX: Final = 480  # width of a frame on the page
 JPEG_QUALITY: Final = 75
+STATISTICS: Final = ("mean (m)", "median (m)", "p95 (m)", "max (m)", "samples")  # of a line of `hippodrome score`
 STYLE: Final = """
 .drive-map { width: 100%; height: auto; max-height: 80vh; display: block; border: 1px solid var(--line); border-radius: 10px;
   background: var(--panel); }
@@ -35,6 +37,7 @@ STYLE: Final = """
 .frames { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 20rem), 1fr)); gap: 1rem; }
 .frames figure { margin: 0; } .frames img { width: 100%; height: auto; display: block; border-radius: 6px; }
 .words td { white-space: normal; text-align: left; min-width: 8rem; } .words th { text-align: left; }
+[aria-label="figures"] :is(th, td):last-child { text-align: left; white-space: normal; min-width: 18rem; }
 @media (max-width: 40rem) {
   .drive-map text { font-size: calc(34 * var(--pixel)); }
   .words thead { display: none; } .words tr { display: block; padding: 0.4rem 0; border-bottom: 1px solid var(--line); }
@@ -207,16 +210,26 @@ def _is_about(definition: str, words: tuple[str, ...]) -> bool:
     return all(word in definition for word in words)
 
 
+def _statistics(numbers: str) -> list[str]:
+    """The figures of a line of `hippodrome score`, one for each of ``STATISTICS``; "-" for one that it does not have."""
+    names = [head.removesuffix(" (m)") for head in STATISTICS[:-1]]
+    parts = [part.removesuffix(" m").rsplit(" ", 1) for part in numbers.split(", ")]
+    named = {part[0]: part[-1] for part in parts if part[0] in names}
+    rest = ", ".join(" ".join(part) for part in parts if part[0] not in names)
+    return [*(named.get(name, "-") for name in names), rest.removesuffix(" samples") or "-"]
+
+
 def _figures(scores: tuple[str, ...]) -> Html:
     rows = [
-        element("tr", element("td", numbers), element("td", definition))
+        element("tr", element("th", definition.partition(";")[0]), [element("td", figure) for figure in _statistics(numbers)],
+                element("td", definition.partition("; ")[2]))
         for numbers, definition in map(_parted, scores)
         if definition
-    ]
+    ]  # fmt: skip
     words = [element("p", f"{line[:1].upper()}{line[1:]}", class_="note") for line in scores if not _parted(line)[1]]
-    heads = element("tr", element("th", "error"), element("th", "what is measured"))
-    table = element("table", element("thead", heads), element("tbody", rows), class_="words", aria_label="figures")
-    return joined(element("div", table, class_="scroll") if rows else "", words)
+    heads = element("tr", [element("th", word) for word in ("error", *STATISTICS, "how it is measured")])
+    table = element("table", element("thead", heads), element("tbody", rows))
+    return joined(scrolling(table, "figures") if rows else "", words)
 
 
 def _said(drive: Drive) -> Html:

@@ -2,7 +2,7 @@
 
 const CHART_LOW_M = 0.05, CHART_HIGH_M = 500; // a tyre's width, and a town's
 const CHART_LEFT = 44, CHART_TOP = 16, CHART_BOTTOM = 18;
-const PARTS = { map: "1 mapping", roads: "2 on the roads", find: "3 where am I?", follow: "4 localized" };
+const PARTS = { map: "1 mapping", roads: "2 on the roads", find: "3 where am I?", follow: "localized" };
 
 function makeChart(canvas, story) {
   const pen = canvas.getContext("2d"), still = document.createElement("canvas");
@@ -36,7 +36,7 @@ function makeChart(canvas, story) {
       if (i % 2) { on.fillStyle = inks.panel; on.fillRect(X(one.s0), CHART_TOP, X(one.s1) - X(one.s0), size.h - CHART_TOP - CHART_BOTTOM); }
       on.fillStyle = inks.soft;
       const words = partWords(one), room = X(one.s1) - X(one.s0);
-      const fitting = [words, words.slice(0, 1)].find((text) => on.measureText(text).width < room - 4);
+      const fitting = [words, words.split(" ", 2).join(" "), words.match(/^\d?/)[0]].find((text) => on.measureText(text).width < room - 4);
       if (fitting) on.fillText(fitting, X(one.s0) + 3, 8);
       seconds(on, one);
     });

@@ -55,11 +55,17 @@ def mission_overview(results: Results) -> Html | None:
     return plain_table(heads, rows, "missions of all scenarios") if rows else None
 
 
+def _plain(key: str) -> str:
+    """The name of a figure that has no column, with its unit as heads have it."""
+    words = key.replace("_", " ")
+    return f"{words.removesuffix(' m')} (m)" if words.endswith(" m") else words
+
+
 def definitions(drive: dict[str, Any]) -> Html:
     """What each figure means, folded."""
     named = {column.key: column.title for column in DRIVE_COLUMNS}
     lines: Sequence[Html] = [
-        element("li", element("strong", named.get(key, key.replace("_", " "))), f": {text}")
+        element("li", element("strong", named.get(key, _plain(key))), f": {text}")
         for key, text in drive.get("definitions", {}).items()
     ]
     return element(

@@ -37,6 +37,9 @@ CAPTIONS: Final = {
     "-localization": "Localization error over the second drive, {}",
     "neurodynamics": "Frames, grid cells and head direction while the estimate settles (Fig. 4)",
     "frames": "The mapping drive as the camera sees it",
+    "stress": "Mean APE of the runs of each case",
+    "robustness": "Mean error from each unknown start under each condition",
+    "places": "Place recognition alone: precision over recall",
 }
 
 PHOTOS: Final = ("frames", "neurodynamics")  # figures made of camera frames

@@ -59,7 +59,7 @@ function showFigures(found) {
   for (const address of found) {
     if (shown.has(address)) continue;
     shown.add(address);
-    const figure = make("figure"), words = decodeURIComponent(address).replace("/figure/", "").replace(".png", "").replaceAll("-", " ");
+    const figure = make("figure"), words = decodeURIComponent(address).replace("/figure/", "").replace(".png", "").replace("/", ": ").replaceAll("-", " ");
     figure.append(make("img", undefined, { src: address, alt: words, loading: "lazy" }), make("figcaption", words));
     at("figures").append(figure);
   }

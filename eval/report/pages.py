@@ -16,7 +16,8 @@ from hippodrome.eval.report.tables import plain_table
 
 # The page asks no server for anything: pictures, style and script are in the file itself.
 POLICY: Final = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-TABLE_SCRIPTS: Final = ("basics.js", "vector.js", "save.js", "tables.js")  # of a page that has tables and pictures only
+# Of a page that has tables and pictures only.
+TABLE_SCRIPTS: Final = ("basics.js", "vector.js", "save.js", "night.js", "tables.js")
 UNITS: Final = ("m", "s", "ms", "%")  # after a comma in a head
 WIDE: Final = 6  # columns from which on a table does not fit a phone
 BAD = re.compile(r"^(WORSE|FAILED|failed|refused|MISSED)\b")  # words of a verdict

@@ -96,7 +96,9 @@ function startPlayer(root) {
     if (film && kind !== "roads") caption(".film", film(find(".film canvas"), t), second ? "second drive" : "first drive");
     if (kind === "map") {
       const i = story.semi ? before(story.semi.t_s, t) : -1;
-      return [`Mapping, ${t.toFixed(0)} s`, i < 0 ? "no semi-metric map" : `the semi-metric map is ${metres(story.semi.error_m[i])} off here`];
+      const layer = layerOf(story, name), later = layer && layer !== story.semi ? layer.error_m[nearestInTime(layer.t_s, t)] : null;
+      const told = [`Mapping, ${t.toFixed(0)} s`, i < 0 ? "no semi-metric map" : `the semi-metric map is ${metres(story.semi.error_m[i])} off here`];
+      return typeof later === "number" ? [...told, `${layer.name}: ${metres(later)} off`] : told;
     }
     if (kind === "roads") return ["The map comes right", `every vertex is laid on the roads: ${name}`];
     const drive = secondDrive(story, name), i = before(drive.t_s, t), elapsed = t - drive.t_s[0];

@@ -166,7 +166,7 @@ def _brain() -> Html:
     )
     colours = element("p", element("b", "integrator", class_="integrator"), " cells follow wheels and gyro, ",
                       element("b", "calibration", class_="calibration"), " cells the views; both on a log scale. ",
-                      "Black is silent, and a dim network knows nothing.")  # fmt: skip
+                      "Both together are white; black is silent, and a dim network knows nothing.")  # fmt: skip
     return element("div", element("div", ring, sheets, class_="networks"), colours, class_="brain")
 
 

@@ -26,6 +26,7 @@ SCRIPTS: Final = (
     "basics.js",
     "vector.js",
     "save.js",
+    "night.js",
     "story.js",
     "mapview.js",
     "map.js",

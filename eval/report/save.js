@@ -91,8 +91,10 @@ for (const figure of document.querySelectorAll(".gallery figure")) {
 
 const dialog = document.querySelector("dialog");
 for (const button of document.querySelectorAll(".enlarge")) button.addEventListener("click", () => {
-  dialog.querySelector("img").src = button.querySelector("img").src;
-  dialog.querySelector("img").alt = button.querySelector("img").alt;
+  const seen = [...button.querySelectorAll("img")].find((one) => one.checkVisibility());
+  dialog.querySelector("img").src = seen.src;
+  dialog.querySelector("img").alt = seen.alt;
+  dialog.classList.toggle("is-night", seen.className === "night");
   dialog.showModal();
 });
 dialog.querySelector("button").addEventListener("click", () => dialog.close());

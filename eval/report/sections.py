@@ -32,6 +32,7 @@ from hippodrome.eval.results.thresholds import limits_missed
 
 NBSP = "\N{NO-BREAK SPACE}"
 WIDE_PX = 1400  # a figure that is wider is given a row of its own, else its letters are too small
+FLAT = 1.45  # and one that is so many times as wide as high, as curves over time are
 MEANING = {"cpu_s": "s of CPU", "step_ms": "ms a step"}  # of a time, by the end of its name
 
 
@@ -56,6 +57,7 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         element("p", _driven(scenario), class_="note"),
         failures,
         _headline(scenario, colours),
+        _undrawn(scenario, colours),
         element("h3", "Mapping (Table I)"),
         mapping_table(scenario, quoted, colours),
         element("p", note, class_="note") if (note := aligned_note(rows)) is not None else None,
@@ -74,7 +76,7 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         _titled("Stage times", _timings(scenario)),
         element("h3", "Run it again"),
         _commands(scenario, files.evidence),
-        _folded("Effective configuration", _configuration(scenario)),
+        _configuration(scenario),
         class_="panel",
         data_town=scenario.name,
         id=anchor(place),
@@ -90,7 +92,7 @@ def _driven_section(place: int, scenario: ScenarioResult, verdict: Html | None, 
         failures,
         element("h3", TITLE),
         missions,
-        _folded("Effective configuration", _configuration(scenario)),
+        _configuration(scenario),
         class_="panel",
         data_town=scenario.name,
         id=anchor(place),
@@ -153,7 +155,7 @@ def _headline(scenario: ScenarioResult, colours: Mapping[str, str]) -> Html:
 
 
 def _tile(row: Row, colours: Mapping[str, str]) -> Html:
-    name = element("span", swatch(colours.get(row.method)), row.method)
+    name = element("span", swatch(colours, row.method), row.method)
     if row.ape is None and row.places is not None:
         right = element("strong", f"{100.0 * row.places.best_is_right:.0f} %")
         return element("div", name, right, element("small", "of the places right"), class_="figure-tile")
@@ -162,11 +164,18 @@ def _tile(row: Row, colours: Mapping[str, str]) -> Html:
     if row.refused is not None:
         small = element("small", f"nothing vouches for its {row.ape.mean_m:.0f}\N{NO-BREAK SPACE}m")
         return element("div", name, element("strong", "refused", class_="bad"), small, class_="figure-tile")
-    details = [f"mean APE, worst {row.ape.max_m:.1f}\N{NO-BREAK SPACE}m" if row.ape.max_m is not None else "mean APE"]
+    details = ["mean APE", *([f"worst {row.ape.max_m:.1f}\N{NO-BREAK SPACE}m"] if row.ape.max_m is not None else [])]
     if row.localization is not None and row.localization.error_mean_m is not None:
         details.append(f"localized to {row.localization.error_mean_m:.2f}\N{NO-BREAK SPACE}m")
     return element("div", name, element("strong", f"{row.ape.mean_m:.2f} m"),
                    [element("small", line) for line in details], class_="figure-tile")  # fmt: skip
+
+
+def _undrawn(scenario: ScenarioResult, colours: Mapping[str, str]) -> Html | None:
+    """Which methods have no colour, as maps do not show them; None if they show all, or there is no map."""
+    names = [row.method for row in reversed(scenario.rows) if row.ape is not None and row.method not in colours]
+    words = f"A ring without a colour: maps and figures do not show {'; '.join(names)}."
+    return element("p", words, class_="note") if names and colours else None
 
 
 def _interactive_map(files: ScenarioFiles) -> Html:
@@ -205,7 +214,9 @@ def gallery(pictures: Sequence[Picture]) -> Html:
 def _figure(picture: Picture) -> Html:
     image = element("img", src=picture.uri, alt=picture.caption, width=picture.width, height=picture.height)
     button = element("button", image, type="button", class_="enlarge", aria_label=f"Enlarge: {picture.caption}")
-    kinds = " ".join(kind for kind, has in (("wide", picture.width > WIDE_PX), ("photo", picture.photo)) if has) or None
+    flat = picture.width > FLAT * picture.height
+    looks = (("wide", picture.width > WIDE_PX or flat), ("flat", flat and picture.width <= WIDE_PX), ("photo", picture.photo))
+    kinds = " ".join(kind for kind, has in looks if has) or None
     drawn = Html(f'<script type="text/plain">{picture.svg}</script>') if picture.svg else None
     return element("figure", button, drawn, element("figcaption", picture.caption), class_=kinds)
 
@@ -220,7 +231,7 @@ def _timings(scenario: ScenarioResult) -> Html | None:
         share = value / longest if longest > 0.0 else 0.0
         bar = element("span", class_="bar", style=f"--share:{share:.4f}")
         rows.append([words, f"{value:.3g} {unit}", bar])
-    return plain_table(["Stage", "Time", "Share of the longest"], rows, "stage times") if rows else None
+    return plain_table(["Stage", "Time", "Share of the longest in the same unit"], rows, "stage times") if rows else None
 
 
 def _unit_of(name: str) -> tuple[str, str]:
@@ -237,7 +248,7 @@ def _commands(scenario: ScenarioResult, evidence: MapEvidence | None) -> Html:
     others = [row.method for row in scenario.rows if row.method not in dict(commands)]
     note = "In the folder that holds this report. Stages take the road network as it is; noise levels that survey it wrongly " \
            "(realistic, harsh) are reproduced by eval only."  # fmt: skip
-    note += f" {', '.join(others)}: with all rows only." if others else ""
+    note += f" {'; '.join(others)}: with all rows only." if others else ""
     return joined(plain_table(["Row", "Command"], lines, "commands"), element("p", note, class_="note"))
 
 
@@ -246,9 +257,12 @@ def _unbroken(command: str) -> list[Html]:
     return [joined(element("span", word), " ") for word in command.split(" ")]
 
 
-def _configuration(scenario: ScenarioResult) -> Html:
-    text = json.dumps(_extra(scenario, "configuration"), indent=2, ensure_ascii=False)
-    return scrolling(element("pre", text), "effective configuration")
+def _configuration(scenario: ScenarioResult) -> Html | None:
+    """Every setting of the scenario, folded; None if the results do not have them."""
+    settings = _extra(scenario, "configuration")
+    text = json.dumps(settings, indent=2, ensure_ascii=False)
+    box = scrolling(element("pre", text), "effective configuration")
+    return _folded("Effective configuration", box) if settings else None
 
 
 def _frames_style(files: ScenarioFiles) -> str | None:

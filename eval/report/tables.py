@@ -21,6 +21,7 @@ from hippodrome.eval.results.tables import (
 )
 
 FIRST: Final = ("APE (m)", "Success", "Error (m)")  # columns beside the method's name, so that a phone shows them unscrolled
+NBSP: Final = "\N{NO-BREAK SPACE}"
 LONG: Final = 36  # letters of a name from which on it is broken
 SPLIT: Final = {  # headings of cells that hold several figures, and those of one column for each figure
     "APE median / p95 / max": ("APE median (m)", "APE p95 (m)", "APE max (m)"),
@@ -41,7 +42,7 @@ def scrolling(table: Html, label: str) -> Html:
 def plain_table(heads: Sequence[str], rows: Sequence[Sequence[Child]], label: str) -> Html:
     """A table with words to the left and figures to the right; ``label`` names it for screen readers."""
     kinds = [None, *("text" if _is_words([row[place] for row in rows]) else None for place in range(1, len(heads)))]
-    head = element("tr", [element("th", title, scope="col", class_=kind) if title else element("td")
+    head = element("tr", [element("th", unbroken(title), scope="col", class_=kind) if title else element("td")
                           for title, kind in zip(heads, kinds, strict=True)])  # fmt: skip
     body = [
         element("tr", row_head(row[0]), [element("td", cell, class_=kind) for cell, kind in zip(row[1:], kinds[1:], strict=True)])
@@ -65,14 +66,14 @@ def grouped_table(groups: Sequence[tuple[str, Sequence[str]]], rows: Sequence[Se
         label: Names the table for screen readers.
     """
     top, below, begins = [], [], set()  # columns with which a group begins: a line parts them from those before
-    column = 0
+    column, grouped = 0, False  # whether the columns before are a group
     for title, heads in groups:
         spans: dict[str, str | int] = {"colspan": len(heads), "scope": "colgroup"} if heads else {"rowspan": 2, "scope": "col"}
-        begin = "begin" if heads else None
+        begin = "begin" if heads or grouped else None
         top.append(element("th", title, class_=begin, **spans))
         below += [element("th", head, scope="col", class_=begin if head == heads[0] else None) for head in heads]
-        begins |= {column} if heads else set()
-        column += len(heads) or 1
+        begins |= {column} if begin else set()
+        column, grouped = column + (len(heads) or 1), bool(heads)
     body = [
         element("tr", row_head(row[0]),
                 [element("td", cell, class_="begin" if place in begins else None) for place, cell in enumerate(row[1:], start=1)])
@@ -148,9 +149,14 @@ def _row_columns(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]
 
 def _row_table(columns: Sequence[Column], rows: Sequence[Row], label: str, colours: Mapping[str, str]) -> Html:
     columns = _row_columns(columns, rows)
-    head = element("tr", [element("th", column.title, scope="col") for column in columns])
-    body = [_row_line(row_cells(columns, row), row, colours.get(row.method)) for row in rows]
+    head = element("tr", [element("th", unbroken(column.title), scope="col") for column in columns])
+    body = [_row_line(row_cells(columns, row), row, colours) for row in rows]
     return scrolling(element("table", element("thead", head), element("tbody", body)), label)
+
+
+def unbroken(title: str) -> str:
+    """A heading whose lengths, as in "RPE 20 m (m)", are not parted from their units."""
+    return re.sub(r"(?<=\d) (?=m\b)|(?<=>) ", NBSP, title)
 
 
 def _parts(column: Column) -> list[Column]:
@@ -164,14 +170,17 @@ def _part(column: Column, place: int, row: Row) -> str:
     return parts[place] if place < len(parts) else NONE
 
 
-def swatch(colour: str | None) -> Html | None:
-    """A dot of the colour that a method has on the maps and in the figures; None for a method that they do not show."""
-    return element("i", class_="swatch", style=f"background:{colour}") if colour else None
+def swatch(colours: Mapping[str, str], method: str) -> Html | None:
+    """A dot of the colour that a method has on maps and in figures, a ring if they do not show it; None if there are no maps."""
+    if method in colours:
+        return element("i", class_="swatch", style=f"background:{colours[method]}")
+    return element("i", class_="swatch none", title="not drawn") if colours else None
 
 
-def _row_line(cells: Sequence[str], row: Row, colour: str | None) -> Html:
+def _row_line(cells: Sequence[str], row: Row, colours: Mapping[str, str]) -> Html:
     style = "failed" if row.failure is not None or row.refused is not None else "quoted" if row.quoted else None
-    return element("tr", row_head(cells[0], swatch(colour)), [element("td", cell) for cell in cells[1:]], class_=style)
+    sign = None if row.quoted else swatch(colours, row.method)
+    return element("tr", row_head(cells[0], sign), [element("td", cell) for cell in cells[1:]], class_=style)
 
 
 def _row(scenario: ScenarioResult, method: str) -> Row | None:

@@ -46,7 +46,8 @@ function makeTraces(canvas) {
     const Y = (value) => top + tall - 6 - ((value - low) / Math.max(high - low, 1e-9)) * (tall - TRACE_HEAD - 10);
     const marks = injections(drawn);
     on.fillStyle = inks.soft;
-    const range = `${sigma(10 ** low)} to ${sigma(10 ** high)}`, wide = `${name}: certainty from ${range}, on a log scale; ticks: the ${marks.length} injections`;
+    const over = top === 0 ? `; from left to right: the second drive, ${Math.round(drawn.t_s.at(-1) - drawn.t_s[0])} s` : "";
+    const range = `${sigma(10 ** low)} to ${sigma(10 ** high)}`, wide = `${name}: certainty from ${range}, on a log scale; ticks: the ${marks.length} injections${over}`;
     on.fillText(size.w < WIDE_PX ? `${name}: ${range}, ${marks.length} injections` : wide, TRACE_LEFT + 5, top + 12);
     if (size.w >= LEGEND_PX && top === 0) drawLegend(on);
     on.fillStyle = inks.accent;

@@ -71,7 +71,7 @@ def write_versus(
         "the error is the same within a tenth of a metre or of itself."
     )
     body = [
-        element("header", element("h1", " and ".join(_titles(before, after)))),
+        element("header", element("h1", "Compared: ", " and ".join(_titles(before, after)))),
         element(
             "main",
             element("p", f"A is {before}, B is {after}. {words}", class_="lede"),

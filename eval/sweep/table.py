@@ -111,6 +111,8 @@ def sweep_markdown(rows: Sequence[Mapping[str, Any]], failures: Sequence[tuple[s
                  for row in driven]  # fmt: skip
         lines += table(heads, cells, align="ll" + "r" * (len(heads) - 2))
         lines += ["", "Figures are over the missions of all runs together; docs/loop.md says what each is.", ""]
+    if failed := [f"- {row['method']}, {one['cell']}: {one['cause']}" for row in rows for one in row["failed"]]:
+        lines += ["## Methods that failed", "", *failed, ""]
     if failures:
         lines += [f"## {len(failures)} cell(s) without a result", "", "The same command runs these, and only these, again.", ""]
         lines += [f"- {name}: {cause}" for name, cause in failures]

@@ -13,7 +13,7 @@ import pytest
 from hippodrome.core.localization.beliefs.config import Mode
 from hippodrome.eval.cli import main, make_parser
 from hippodrome.eval.commands import exchange, trials
-from hippodrome.eval.commands.arguments import BAD_INPUT
+from hippodrome.eval.commands.arguments import BAD_INPUT, print_listed
 from hippodrome.eval.exchange.export import FORMATS
 from hippodrome.eval.exchange.importing import READERS
 from hippodrome.eval.exchange.readers.layouts import LAYOUTS
@@ -163,3 +163,16 @@ def test_a_port_that_is_no_number_is_refused_in_words(capsys):
     with pytest.raises(SystemExit):
         main(["serve", "out", "--port", "abc"])
     assert "'abc' is not a whole number" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("columns", [20, 80])
+def test_a_list_fits_its_terminal_and_keeps_a_line_elsewhere(capsys, monkeypatch, columns):
+    words = "one of ours, with words that go on below it " * 3
+    print_listed("name" + " " * 20, words)
+    assert capsys.readouterr().out == f"name{' ' * 21}{words.rstrip()}\n"
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    print_listed("name" + " " * 20, words)
+    lines = capsys.readouterr().out.splitlines()
+    assert all(len(line) <= columns for line in lines) and len(lines) > 1
+    assert " ".join(" ".join(lines).split()) == f"name {words.rstrip()}"

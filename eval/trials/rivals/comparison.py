@@ -66,7 +66,8 @@ def draw_sequences(materials: Materials, found: Sequence[LocalizedSequence]) -> 
     row = max(whole, key=lambda one: one.length_m)
     title = f"{materials.scenario.name}: localization from an unknown start, sequence {row.number}, {row.length_m:g} m"
     shown = {label: scores[label, row.number] for label in labels}
-    draw_localization_comparison(materials.folder / "localization-methods.png", shown, title)
+    order = [method.label for method in OF_THE_EVALUATION]  # so that a method has the colour that it has on the maps
+    draw_localization_comparison(materials.folder / "localization-methods.png", shown, title, order)
 
 
 def _scored(paths: dict[Method, Path], truth: Trajectory) -> dict[Method, ScoredTrajectory]:

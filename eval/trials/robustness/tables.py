@@ -88,15 +88,16 @@ def kidnapping_markdown(kidnapped: Mapping[str, Sequence[Kidnapping]]) -> str:
 
 
 def paper_lengths_markdown(paper: Sequence[PaperSequence]) -> str:
-    """The paper's ten lengths: one row each, and one for all of them."""
+    """The paper's ten lengths: one row each, and one for all of them. Below it, why some have no figures."""
     rows = []
     for record in map(paper_record, paper):
-        end = record["failure"] or record["false_fixes"]
-        rows.append([str(record["number"]), f"{record['length_m']:g}", *_errors(record, "localized_after_m"), str(end)])
+        fixes = NONE if record["failure"] else str(record["false_fixes"])
+        rows.append([str(record["number"]), f"{record['length_m']:g}", *_errors(record, "localized_after_m"), fixes])
+    why = [f"- sequence {one['number']}: {one['failure']}" for one in map(paper_record, paper) if one["failure"]]
     row = paper_summary(paper)
     localized = f"{row['successes']} of {row['sequences']} localized"
     rows.append(["all", localized, *_errors(row, "localized_after_median_m"), str(row["false_fixes"])])
-    return _part("## The paper's ten lengths, same condition", table(PAPER_HEAD, rows, align="left"))
+    return _part("## The paper's ten lengths, same condition", table(PAPER_HEAD, rows, align="left"), "\n".join(why))
 
 
 def targets_markdown(found: Sequence[Target]) -> str:
@@ -104,7 +105,7 @@ def targets_markdown(found: Sequence[Target]) -> str:
     rows = [
         [one.item, one.with_unit, f"{one.must:g} {one.unit}", f"{one.aim:g} {one.unit}", one.verdict] for one in found
     ]  # fmt: skip
-    return _part("## Against the targets", table(("item", "measured", "must", "aim", ""), rows, align="left"))
+    return _part("## Against the targets", table(("item", "measured", "must", "aim", "verdict"), rows, align="left"))
 
 
 def towns_targets_markdown(towns: Mapping[str, Sequence[Target]], pooled_targets: Sequence[Target]) -> str:

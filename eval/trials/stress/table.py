@@ -43,6 +43,7 @@ def stress_markdown(rows: Sequence[StressRow]) -> str:
     cases = dict.fromkeys(_name(row) for row in rows)
     lines = table(HEAD, [_cells(case, [row for row in rows if _name(row) == case]) for case in cases])
     refused = [f"- {_name(row)}, {row.scenario}, seed {row.seed}: {row.failure}. `{row.rerun}`" for row in rows if row.failure]
+    refused = ["## Refused or failed", "", *refused] if refused else []
     return "\n".join(["# Stress of the refinement, from rendered frames", "", *lines, "", *NOTES, "", *refused, ""])
 
 

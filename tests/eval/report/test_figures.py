@@ -184,7 +184,9 @@ def test_the_tiles_and_the_cards_and_the_table_of_all_towns(tree, scenarios):
             if row["ape"] is None or row.get("refused"):
                 continue
             assert is_told(figure.text().removesuffix(" m"), row["ape"]["mean_m"])
-            for small in tile.all("small"):
+            first, *others = tile.all("small")
+            assert first.text() == "mean APE"
+            for small in others:
                 path = "ape.max_m" if "worst" in small.text() else "localization.error_mean_m"
                 assert is_told(re.search(r"[\d.,]+(?= m$)", small.text())[0], value_at(row, path))
     for card in tree.all("a", class_="town"):

@@ -153,3 +153,20 @@ def test_figures_are_saved_as_png_svg_and_pdf(browser, report):
                 assert tab.run(f"window.kept[0].text().then((text) => {problems})") == 0
     assert tab.complaints() == []
     tab.close()
+
+
+def test_figures_keep_the_colours_of_methods_in_the_dark_and_are_light_for_print(browser, report):
+    tab = browser.open(f"{report.as_uri()}#scenario-1", dark=True, still=True)
+    drawn = "document.querySelector('.panel:not([hidden]) .enlarge .night')"
+    tab.run("document.querySelector('.panel:not([hidden]) .enlarge').scrollIntoView()")
+    assert "%23d55e00" in tab.until(f"{drawn}?.naturalWidth && {drawn}.src")
+    seen = "[...document.querySelector('.enlarge:has(.night)').querySelectorAll('img')].map((one) => one.checkVisibility())"
+    assert tab.run(seen) == [False, True]
+    colours = "[[255, 255, 255], [0, 0, 0], [0, 114, 178], [68, 1, 84]].map((one) => nightColour(one))"
+    paper, ink, blue, faint = tab.run(colours)
+    assert (max(paper), min(ink), blue) == (28, 228, [0, 114, 178])
+    assert min(faint) > 30, "what would not be seen is lighter"
+    tab.call("Emulation.setEmulatedMedia", media="print")
+    assert tab.run(seen) == [True, False]
+    assert tab.complaints() == []
+    tab.close()

@@ -70,7 +70,7 @@ def test_without_a_tracker_nothing_is_drawn_anew(folder):
 
 def test_the_longest_sequence_that_all_finished_is_shown(folder, monkeypatch):
     shown = {}
-    monkeypatch.setattr(comparison, "draw_localization_comparison", lambda path, scores, title: shown.update({title: scores}))
+    monkeypatch.setattr(comparison, "draw_localization_comparison", lambda path, scores, title, _: shown.update({title: scores}))
     score = SimpleNamespace(errors_m=np.array([FALSE_FIX_M]))
     rows = [("ours", 1, 170.0, score), ("ours", 2, 300.0, score), ("ours", 3, 800.0, score)]
     rows += [("theirs", 1, 170.0, score), ("theirs", 2, 300.0, score), ("theirs", 3, 800.0, None)]

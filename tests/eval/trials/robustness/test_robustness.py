@@ -159,7 +159,8 @@ def test_failures_say_how_to_run_them_again_and_the_yardsticks_have_rows(tmp_pat
     assert "start 7: 1 false fixes; again: `--conditions same --start 7`" in text
     assert text.count("--start") == 1  # a yardstick's failures are its own
     assert "| kalman | 100 % of 1 | 25.00 / 25.00 / 25.00 |" in text
-    assert "| 1 | 372.7 | - | - | - | - | - | the localization drive is 300 m long" in text
+    assert "| 1 | 372.7 | - | - | - | - | - | - |" in text
+    assert "- sequence 1: the localization drive is 300 m long" in text
     capsys.readouterr()
 
 

@@ -24,6 +24,7 @@ from hippodrome.sim.types import Town
 
 LARGE_BYTES: Final = 8_000_000  # of a network's file: some 200 km; what is smaller is read within a second or two
 LARGE_PACKED_BYTES: Final = 800_000  # the same, packed
+KEPT: Final = "kept"  # the folder of kept towns, which nobody else locks: the one it lies in may be held by the command itself
 CODE: Final = ("sim/**/*.py", "core/roads/*.py")  # that a town depends on
 OUTLINES: Final = ("junction_polygons_m", "other_lanes_m", "turning_places_m")  # parts of a town that are many arrays (n, 2)
 WORDS: Final = ("lane_ids", "edge_ids")  # parts of its network that are names
@@ -41,11 +42,12 @@ def kept_town(net_file: Path, folder: Path, read: Callable[[], Town]) -> Town:
 
     Args:
         net_file: The network.
-        folder: Where the town is kept, under a name that the network's bytes and our code give.
+        folder: Below it the town is kept, under a name that the network's bytes and our code give.
         read: Reads and checks the network.
     """
     if not is_large(net_file):
         return read()
+    folder = folder / KEPT
     recipe = sha256_of(net_file), net_file.name, code_sha256(PACKAGE, CODE), version("eclipse-sumo")
     path = folder / f"{net_file.name.partition('.')[0]}-{hashlib.sha256(repr(recipe).encode()).hexdigest()[:12]}.town.npz"
     folder.mkdir(parents=True, exist_ok=True)

@@ -28,7 +28,8 @@ from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
 from hippodrome.sim.sumo_tools import check_that_sumo_reads, run_tool
-from hippodrome.sim.town_file import kept_town
+from hippodrome.sim.town_file import is_large, kept_town
+from hippodrome.sim.town_reader import read_apart
 from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.types import Town
 
@@ -70,6 +71,8 @@ def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
 
 def _that_sumo_reads(net_file: Path) -> Town:
     """A town from a network that somebody gives."""
+    if is_large(net_file):
+        return read_apart(net_file, lambda: check_that_sumo_reads(net_file))
     town = read_town(net_file)
     check_that_sumo_reads(net_file)
     return town

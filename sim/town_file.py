@@ -52,10 +52,10 @@ def kept_town(net_file: Path, folder: Path, read: Callable[[], Town]) -> Town:
     path = folder / f"{net_file.name.partition('.')[0]}-{hashlib.sha256(repr(recipe).encode()).hexdigest()[:12]}.town.npz"
     folder.mkdir(parents=True, exist_ok=True)
     with _one_at_a_time(folder):
-        town = _from_file(path, net_file)
+        town = town_from_file(path, net_file)
         if town is None:
             town = read()
-            write_arrays(path, _arrays(town, path.name))
+            write_town(path, town)
     return town
 
 
@@ -69,6 +69,11 @@ def _one_at_a_time(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def write_town(path: Path, town: Town) -> None:
+    """A town on disk, whole or not at all."""
+    write_arrays(path, _arrays(town, path.name))
 
 
 def _arrays(town: Town, file_name: str) -> dict[str, Any]:
@@ -96,7 +101,7 @@ def _digest(arrays: dict[str, Any]) -> str:
     return digest.hexdigest()
 
 
-def _from_file(path: Path, net_file: Path) -> Town | None:
+def town_from_file(path: Path, net_file: Path) -> Town | None:
     """The town that was kept; None if there is none, or none that is whole."""
     joined = [name for part in OUTLINES for name in (part, f"{part}_ends")]
     wanted = ["words", "signals_m", *joined, *(f"network_{name}" for name in NUMBERS)]

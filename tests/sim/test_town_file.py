@@ -2,6 +2,7 @@
 
 import fcntl
 import json
+import os
 from dataclasses import fields, replace
 
 import numpy as np
@@ -9,10 +10,11 @@ import pytest
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.cli import main
-from hippodrome.sim import town_file
+from hippodrome.sim import town, town_file
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.town import TownSpec, build_town, read_town
 from hippodrome.sim.town_file import kept_town
+from hippodrome.sim.town_reader import read_apart
 from tests.changes import array_changed
 
 
@@ -66,6 +68,23 @@ def test_a_scenario_s_town_is_kept_unless_it_is_refused(tmp_path, net_file):
     with pytest.raises(HippodromeError, match="broken network"):
         build_town(TownSpec(network=net_file), 1, folder)
     assert len(list(folder.glob("kept/*"))) == 2
+
+
+def test_a_large_network_is_read_by_a_process_of_its_own(tmp_path, net_file, monkeypatch):
+    """``sumolib``'s objects are hundreds of megabytes that never all come back."""
+    monkeypatch.setattr(town, "read_town", lambda *_: pytest.fail("read here"))
+    assert same(build_town(TownSpec(network=net_file), 1, tmp_path), read_town(net_file))
+    odd = tmp_path / os.fsdecode(b"odd\xff.net.xml")
+    odd.write_text("<net><edge")
+    with pytest.raises(HippodromeError, match="broken network") as found:
+        read_apart(odd, refuse)
+    assert str(found.value).startswith(f"{odd}: ")
+    with pytest.raises(HippodromeError, match="as SUMO says"):
+        read_apart(net_file, refuse)
+
+
+def refuse():
+    raise HippodromeError("as SUMO says")
 
 
 def test_a_kept_town_that_was_changed_or_is_another_network_s_is_read_anew(tmp_path, net_file):

@@ -1,7 +1,6 @@
 """Large networks are read by a process of their own: what ``sumolib`` makes of 1,000 km is 300 MB that never all come back.
 
 A process that reads such a network and then lets SUMO load it would hold more than a gigabyte.
-``python -m hippodrome.sim.town_reader NETWORK FILE`` reads a network and writes the town.
 """
 
 from __future__ import annotations
@@ -15,18 +14,19 @@ from typing import Final
 from hippodrome._folders import temporary_folder
 from hippodrome._processes import dying_with_me
 from hippodrome.core.types import HippodromeError
-from hippodrome.sim.town_file import town_from_file, write_town
+from hippodrome.sim.town_file import town_from_file
 from hippodrome.sim.types import Town
 
 REFUSED: Final = 2  # exit status when the network cannot be used; what is wrong stands in the answer
 ENCODING: Final = ("utf-8", "surrogateescape")  # of the answer: names of files may be no UTF-8
 
 
-def read_apart(net_file: Path, meanwhile: Callable[[], None]) -> Town:
+def read_apart(net_file: Path, module: str, meanwhile: Callable[[], None]) -> Town:
     """The town of a network, read by a process of its own.
 
     Args:
         net_file: The network.
+        module: The Python module that reads it, if it is run with the network and the file to write.
         meanwhile: Is done here while it is read; where both fail, what is wrong with the reading is said.
 
     Raises:
@@ -35,7 +35,7 @@ def read_apart(net_file: Path, meanwhile: Callable[[], None]) -> Town:
     with temporary_folder() as folder:
         path, said = folder / "read.town.npz", folder / "said"
         with said.open("wb") as log, subprocess.Popen(
-            [sys.executable, "-m", "hippodrome.sim.town_reader", str(net_file), str(path)],
+            [sys.executable, "-m", module, str(net_file), str(path)],
             stdin=subprocess.DEVNULL, stdout=log, stderr=log, preexec_fn=dying_with_me(),
         ) as child:  # fmt: skip
             try:
@@ -63,19 +63,3 @@ def _complaint_of(what: Callable[[], None]) -> HippodromeError | None:
     except HippodromeError as error:
         return error
     return None
-
-
-def main(net_file: str, path: str) -> int:
-    """Read a network and write the town; the exit status."""
-    from hippodrome.sim.town import read_town  # which calls ``read_apart``
-
-    try:
-        write_town(Path(path), read_town(Path(net_file)))
-    except HippodromeError as error:
-        sys.stdout.buffer.write(str(error).encode(*ENCODING))
-        return REFUSED
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))

@@ -77,10 +77,10 @@ def test_a_large_network_is_read_by_a_process_of_its_own(tmp_path, net_file, mon
     odd = tmp_path / os.fsdecode(b"odd\xff.net.xml")
     odd.write_text("<net><edge")
     with pytest.raises(HippodromeError, match="broken network") as found:
-        read_apart(odd, refuse)
+        read_apart(odd, town.READER, refuse)
     assert str(found.value).startswith(f"{odd}: ")
     with pytest.raises(HippodromeError, match="as SUMO says"):
-        read_apart(net_file, refuse)
+        read_apart(net_file, town.READER, refuse)
 
 
 def refuse():

@@ -190,6 +190,9 @@ class LaneReadings(ShortRepr):
     end_m: Float32Array  # (S,) from the rear axle along the lane to its stop line or its junction's mouth
     end_variance_m2: Float32Array  # (S,)
     end: UInt8Array  # (S,) 0 nothing, 1 stop line, 2 mouth
+    # (S, 2) probability in per cent that the left and the right border are the edge of the road, with no lane beyond; 255 where a
+    # border was not seen. None in maps from before it was kept.
+    edge_percent: UInt8Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -115,7 +115,8 @@ class RoadSense:
         if len(rows) > 1:
             road = np.flatnonzero(beside & (np.abs(np.sin(off_rad)) < math.sin(SAME_WAY_RAD)))
             aside = np.cos(pose[2]) * -away[:, 1] - np.sin(pose[2]) * -away[:, 0]  # left of the vehicle
-            fits = np.array([fit_of_borders(reading.left_edge, reading.right_edge, aside[row], aside[road], network.width_m[near.lane[row]]) for row in rows])
+            edges, widths_m = (reading.left_edge, reading.right_edge), network.width_m[near.lane[rows]]
+            fits = np.array([fit_of_borders(*edges, aside[k], aside[road], w) for k, w in zip(rows, widths_m, strict=True)])
             chosen = self._told_apart(fits, best, near.lane[rows])
             if chosen is None:
                 return None

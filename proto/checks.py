@@ -7,8 +7,7 @@ from math import prod
 
 import numpy as np
 
-from hippodrome.core.reading.borders import UNSEEN_PERCENT
-from hippodrome.core.types import CognitiveMap, EdgeKind, LaneReadings, MatchStatus, RoadMatch
+from hippodrome.core.types import UNSEEN_PERCENT, CognitiveMap, EdgeKind, LaneReadings, MatchStatus, RoadMatch
 from hippodrome.proto.arrays import Array, FieldError
 
 MOST_SECONDS = 1e11  # of a time stamp: the year 5138

@@ -14,8 +14,7 @@ from typing import Final
 import numpy as np
 
 from hippodrome.core.reading import RoadReader, RoadReading
-from hippodrome.core.reading.borders import UNSEEN_PERCENT
-from hippodrome.core.types import Frame, LaneReadings, Observation
+from hippodrome.core.types import UNSEEN_PERCENT, Frame, LaneReadings, Observation
 from hippodrome.core.views.config import CameraGeometry
 from hippodrome.core.views.odometry import grey_image, seen_step
 

@@ -11,7 +11,6 @@ from hippodrome.core.types import FloatArray
 
 SURELY: Final = 0.98  # largest probability with which a border is believed to be of a kind
 FITS, CONTRADICTS = -1.0, -2.0  # log likelihood of the borders of a lane that is the vehicle's, and of one that is not
-UNSEEN_PERCENT: Final = 255  # in the place of a probability in per cent, for a border that was not seen
 
 
 def fit_of_borders(left_edge: float, right_edge: float, aside_m: float, others_m: FloatArray, width_m: float) -> float:

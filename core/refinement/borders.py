@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from hippodrome.core.reading.borders import CONTRADICTS, FITS, UNSEEN_PERCENT, fit_of_borders
+from hippodrome.core.reading.borders import CONTRADICTS, FITS, fit_of_borders
 from hippodrome.core.roads.geometry import project, road_geometry
 from hippodrome.core.roads.network import BoolArray, RoadNetwork
 from hippodrome.core.se2 import wrap
-from hippodrome.core.types import FloatArray, UInt8Array
+from hippodrome.core.types import UNSEEN_PERCENT, FloatArray, UInt8Array
 
 REACH_M: Final = 12.0  # two lanes aside, and the lane beyond the second
 ASIDE_M: Final = 8.0  # lanes farther aside than two are not the vehicle's

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from hippodrome.core.reading.borders import UNSEEN_PERCENT
 from hippodrome.core.refinement.borders import places_by_borders
 from hippodrome.core.roads.network import RoadNetwork
+from hippodrome.core.types import UNSEEN_PERCENT
 
 WIDTH_M, LENGTH_M = 3.2, 100.0
 RIGHTMOST, INNER = (4, 99), (4, 6)  # per cent: the left and the right border are the edge of the road

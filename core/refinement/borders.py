@@ -45,7 +45,8 @@ def places_by_borders(poses: FloatArray, edge_percent: UInt8Array, network: Road
         rows = np.arange(near.start[keyframe], near.start[keyframe + 1])
         others_m, rows = left[rows[of_road[rows]]], rows[own[rows]]
         width_m = network.width_m[near.lane[rows]]
-        fits = np.array([fit_of_borders(*edges[keyframe], left[k], others_m, w) for k, w in zip(rows, width_m, strict=True)])
+        to_left, to_right = edges[keyframe].tolist()
+        fits = np.array([fit_of_borders(to_left, to_right, left[k], others_m, w) for k, w in zip(rows, width_m, strict=True)])
         if fits.max() > FITS and fits.min() < CONTRADICTS:
             fitting = rows[fits > FITS]
             nearest = fitting[np.argmin(near.distance_m[fitting])]

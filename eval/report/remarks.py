@@ -114,7 +114,11 @@ def surprises(scenarios: Sequence[ScenarioResult]) -> Html | None:
 def _same(scenarios: Sequence[ScenarioResult]) -> str | None:
     pairs = [(_row(one, SEMI_METRIC.label), _row(one, NO_ATTRACTOR.label)) for one in scenarios]
     both = [(one, other) for one, other in pairs if one is not None and other is not None]
-    return SAME if both and all((one.ape, one.ape_sim2) == (other.ape, other.ape_sim2) for one, other in both) else None
+    return SAME if both and all(_errors_m(one) == _errors_m(other) for one, other in both) else None
+
+
+def _errors_m(row: Row) -> list[tuple[float, float | None] | None]:
+    return [None if one is None else (one.mean_m, one.max_m) for one in (row.ape, row.ape_sim2, row.rpe)]
 
 
 def _by_wheels_alone(scenarios: Sequence[ScenarioResult]) -> str | None:

@@ -66,8 +66,8 @@ function storyTime(segments, drive, t) {
   const kinds = drive === 2 ? SECOND : ["map"];
   const own = segments.filter((one) => kinds.includes(one.kind));
   if (!own.length) return 0;
-  const one = own.find((segment) => t <= segment.t1) || own.at(-1);
-  return one.s0 + Math.min(1, Math.max(0, (t - one.t0) / Math.max(one.t1 - one.t0, 1e-9))) * (one.s1 - one.s0);
+  const one = own.find((segment) => t < segment.t1) || own.at(-1); // the end of one is the begin of the next
+  return one.s0 + Math.min(1 - 1e-9, Math.max(0, (t - one.t0) / Math.max(one.t1 - one.t0, 1e-9))) * (one.s1 - one.s0);
 }
 
 /** A position on a timed path, linear in time. */

@@ -50,15 +50,12 @@ def title(results: Results) -> str:
 def lede(results: Results) -> Html:
     """What was done, in two sentences."""
     km = sum(one.network.km for one in results.scenarios)
-    frames, drive_s = (sum(getattr(one, name) for one in results.scenarios) for name in ("frames", "duration_s"))
+    drive_s = sum(one.duration_s for one in results.scenarios)
     driven = [coverage * one.network.km for one in results.scenarios if (coverage := _coverage(one)) is not None]
-    road = (
-        f"{sum(driven):.1f} of {km:.1f} km" if len(driven) == len(results.scenarios) else f"streets of a network of {km:.1f} km"
-    )
+    road = f"{sum(driven):.1f} of {km:.1f} km of road" if len(driven) == len(results.scenarios) else f"in {km:.1f} km of road"
     return joined(
-        f"In each town a simulated car drives twice. The first drives ({frames:,} camera frames, {drive_s / 60:.0f} minutes, "
-        f"{road} of road, each direction counted) are mapped by every method from camera and wheels; the topometric maps are "
-        "laid on the road network, too. The second drives are localized in those maps, from an unknown start."
+        f"In each town a simulated car drives twice. The first drives ({drive_s / 60:.0f} minutes, {road}) are mapped from "
+        "camera and wheels; the second ones are localized in those maps, from an unknown start."
     )
 
 

@@ -198,7 +198,7 @@ def _interactive_map(files: ScenarioFiles) -> Html:
         element("fieldset", element("legend", "Layers"), class_="layers"),
         element("label", element("input", type="checkbox", checked=True, class_="by-error"), "colour vertices by APE"),
         element("div", class_="colourbar"),
-        element("small", "Coloured by APE, the rim is the method's colour.", class_="soft"),
+        element("small", "Vertices coloured by APE have a rim in their method's colour where several maps are shown."),
         element("label", "Vertex ", element("input", type="range", min=0, value=0, class_="scrub")),
         element("div", class_="tile", role="img", hidden=True) if files.thumbnails else None,
         element("p", "Hover over a vertex, click to keep it and see its camera frame.", class_="vertex", aria_live="polite"),

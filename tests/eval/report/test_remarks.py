@@ -21,7 +21,7 @@ def test_the_title_counts_methods_and_towns():
 def test_the_first_sentence_says_how_much_of_the_roads_was_driven():
     tour = {"mapping": {"coverage": 0.25}}
     assert "0.5 of 2.0 km of road" in lede(Results(scenarios=(scenario("a", tours=tour),)))
-    assert "streets of a network of 2.0 km of road" in lede(Results(scenarios=(scenario("a"),)))
+    assert "in 2.0 km of road" in lede(Results(scenarios=(scenario("a"),)))
 
 
 def test_equal_rows_and_a_better_dead_reckoning_are_explained():

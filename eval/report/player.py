@@ -13,6 +13,7 @@ from hippodrome.eval.results.model import Results, ScenarioResult
 
 # player.js writes them as factors of real time, of which a long drive's story has more.
 SPEEDS = (("0.25", "¼ speed"), ("0.5", "½ speed"), ("1", "1× speed"), ("2", "2× speed"), ("4", "4× speed"))
+SLOWER: Final = "The second drive is told more slowly until it is localized, and for six seconds after"
 # The curves have the same names above them (chart.js).
 PARTS = (("map", "1 The map grows"), ("roads", "2 It comes right"), ("find", "3 Where am I?"), ("follow", "4 Localized"))
 EXPLAINED = (  # what is seen in the parts of the story that leave room for it
@@ -189,7 +190,7 @@ def _transport(has_modules: bool) -> Html:
         "div",
         element("button", "▶ Play", type="button", class_="play", aria_pressed="false"),
         parts,
-        element("select", speeds, class_="speed", aria_label="Speed"),
+        element("select", speeds, class_="speed", aria_label="Speed", title=SLOWER),
         element("label", "Map ", element("select", class_="choice")),
         element("label", element("input", type="checkbox", checked=True, class_="modules"), " grid modules")
         if has_modules

@@ -64,7 +64,7 @@ function makeChart(canvas, story) {
   /** The names of the curves of the first drive in their colours, beside the name of its part, as far as there is room. */
   function nameCurves(on) {
     const first = segments.find((one) => one.kind === "map");
-    let x = first ? X(first.s0) + on.measureText(partWords(first)).width + 10 : Infinity;
+    let x = first ? X(first.s0) + on.measureText(partWords(first)).width + (size.w < 480 ? 4 : 10) : Infinity;
     for (const { path, drive, colour } of curves()) {
       const wide = on.measureText(path.name).width;
       if (drive !== 1 || x + wide + 12 > X(first.s1)) continue;

@@ -1,8 +1,8 @@
 // The story of a run: the first drive is mapped, the map comes right on the roads, the second drive is found in it. No drawing here.
 
-const ROADS_SHARE = 0.16; // of the first drive's length that the map takes to come right: there is room for the part's name
+const ROADS_SHARE = 0.15; // of the first drive's length that the map takes to come right: there is room for the part's name
 const SETTLING = 6; // so many times slower than the rest, at least, as the localizer finds itself within seconds
-const FIND_SHARE = 0.16; // and so much of the first drive's length, at least, for the same reason
+const FIND_SHARE = 0.14; // and so much of the first drive's length, at least, for the same reason
 const AFTER_FIX_S = 6; // of the second drive that are still told slowly after the first fix
 const SECOND = ["find", "settled", "follow"]; // kinds of the segments of the second drive
 /** The part of the story that a segment belongs to: the fourth one begins slowly, with the first fix. */

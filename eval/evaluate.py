@@ -54,9 +54,9 @@ def evaluate_scenario(task: EvaluationTask) -> ScenarioResult:
     if performance.unscored or not (has_frames(materials.mapping) and has_frames(materials.drive)):
         return scenario_result(materials, performance.rows, performance.outcomes)  # the pictures show frames and errors
     write_map_evidence(materials, scored, localized)
-    write_second_drive(materials, localized)
+    as_printed = write_second_drive(materials, localized)
     write_why(materials.folder, localized, materials.roads)
     if task.figures:
         semi_metric = next((one.mapped.cognitive_map for one in performance.outcomes if one.method == SEMI_METRIC), None)
         draw_scenario(materials, semi_metric, scored, localized)
-    return scenario_result(materials, performance.rows, performance.outcomes)
+    return scenario_result(materials, performance.rows, performance.outcomes, as_printed)

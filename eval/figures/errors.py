@@ -48,10 +48,11 @@ def draw_error_violins(path: Path, ape: Mapping[str, Score], rpe: Mapping[str, S
     for axes, scores, name in zip(figure.subplots(1, 2), (ape, rpe), ("APE", "RPE"), strict=True):
         for place, (score, colour) in enumerate(reversed(coloured(scores.values()))):  # the last one first, as in the tables
             _violin(axes, place, score.errors_m, colour)
-        tidy(axes, "", f"{name} (m)", title if name == "APE" else "box: quartiles, line: median, diamond and number: mean")
+        tidy(axes, "", f"{name} (m)", title if name == "APE" else "")
         axes.set_xticks(range(len(scores)), [method.replace(" ", "\n", 1) for method in reversed(list(scores))], fontsize=8)
         axes.set_xlim(-0.6, len(scores) - 0.4)
         log_errors(axes, _together(scores))
+    figure.supxlabel("in both: box: quartiles, line: median, diamond and number: mean", fontsize=8)
     save_figure(figure, path, for_print=True)
 
 

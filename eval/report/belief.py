@@ -21,6 +21,8 @@ from hippodrome.core.localization.localizer import Localizer
 from hippodrome.core.types import CognitiveMap, FloatArray, IntArray, LocalizationEstimate, Trajectory
 from hippodrome.eval.methods.materials import Materials, Outcome
 from hippodrome.eval.methods.method import TOPOMETRIC, Method
+from hippodrome.eval.methods.stages import localize_recording
+from hippodrome.eval.metrics.localization import score_localization
 from hippodrome.eval.report.candidates import Look, looks_at
 from hippodrome.eval.report.evidence import (
     DECIMALS_M,
@@ -36,7 +38,7 @@ from hippodrome.eval.report.evidence import (
     worst_places,
 )
 from hippodrome.eval.results.kept import read_kept
-from hippodrome.eval.results.model import ResultsError
+from hippodrome.eval.results.model import ResultsError, Row, summarize_localization
 from hippodrome.sim.recording import Recording
 
 AS_PRINTED: Final = "topometric, networks as printed"
@@ -84,15 +86,18 @@ class SecondDrive(EvidenceModel):
     looks: tuple[Look, ...] = ()  # at the worst moments of each
 
 
-def write_second_drive(materials: Materials, localized: Mapping[Method, Outcome]) -> None:
+def write_second_drive(materials: Materials, localized: Mapping[Method, Outcome]) -> Row | None:
     """Write the second drive: where it really was, what its camera saw, and what each localizer believed.
 
     Args:
         materials: What was evaluated.
         localized: The methods that localized the second drive.
+
+    Returns:
+        The figures of the networks as the paper prints them, which are shown beside our methods; None where they were not tried.
     """
     if not localized:
-        return
+        return None
     drive, truth = materials.drive, materials.drive.ground_truth()
     frames = _spread(drive)
     sheet, columns = frame_sheet(drive, frames)
@@ -105,7 +110,7 @@ def write_second_drive(materials: Materials, localized: Mapping[Method, Outcome]
         if outcome.localization is not None and outcome.localization.estimates
     ]
     if (printed := _as_printed(materials, localized)) is not None:
-        beliefs.insert(0, printed)  # the page shows the last one first
+        beliefs.insert(0, printed[0])  # the page shows the last one first
     _, jpeg = cv2.imencode(".jpg", sheet[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     write_atomically(materials.folder / SECOND_FRAMES, jpeg.tobytes())
     maps = {method.label: outcome.refined for method, outcome in localized.items() if outcome.refined is not None}
@@ -117,6 +122,7 @@ def write_second_drive(materials: Materials, localized: Mapping[Method, Outcome]
     )
     content = SecondDrive(truth=timed_path(truth), frames=tiles, beliefs=beliefs, looks=looks)
     write_atomically(materials.folder / BELIEF_JSON, f"{content.model_dump_json()}\n".encode())
+    return None if printed is None else printed[1]
 
 
 def belief_of(
@@ -138,7 +144,10 @@ def belief_of(
         map_of: Label of the method whose map it is, where that is not ``name``.
     """
     times_s = np.array([one.t_s for one in estimates])
-    chosen = [estimates[step] for step in _steps(times_s)]
+    steps = _steps(times_s)
+    if (worst := _worst_declared(estimates, times_s, truth)) is not None:
+        steps = np.union1d(steps, worst)
+    chosen = [estimates[step] for step in steps]
     poses = np.array([one.pose for one in chosen])
     shown_s = np.array([one.t_s for one in chosen])
     views = [_view(one.view_cell, cognitive_map) for one in chosen]
@@ -172,20 +181,20 @@ def read_second_drive(path: Path) -> SecondDrive:
     return content
 
 
-def _as_printed(materials: Materials, localized: Mapping[Method, Outcome]) -> Belief | None:
-    """The belief of the networks as the paper prints them, in our map, so that what they do and where they fail is seen.
+def _as_printed(materials: Materials, localized: Mapping[Method, Outcome]) -> tuple[Belief, Row] | None:
+    """The belief of the networks as the paper prints them, in our map, and its figures: what they do and where they fail.
 
-    None where the scenario's localizer is in that mode itself, or nothing was localized in our map. It has no row: no figure of
-    the results depends on it.
+    None where the scenario's localizer is in that mode itself, or nothing was localized in our map.
     """
     config, outcome = materials.scenario.localizer, localized.get(TOPOMETRIC)
     if outcome is None or not isinstance(outcome.refined, CognitiveMap) or config.mode == "paper":
         return None
     printed = replace(config, mode="paper")
-    localizer = Localizer(outcome.refined, materials.roads, printed)
-    estimates = [localizer.step(observation) for observation in materials.drive.observations()]
+    made = localize_recording(materials.drive.observations(), Localizer(outcome.refined, materials.roads, printed))
     truth = materials.drive.ground_truth()
-    return belief_of(AS_PRINTED, estimates, truth, outcome.refined, _periods_m(printed), TOPOMETRIC.label)
+    score = score_localization(made.estimates, truth, made.step_s)
+    belief = belief_of(AS_PRINTED, made.estimates, truth, outcome.refined, _periods_m(printed), TOPOMETRIC.label)
+    return belief, Row(method=AS_PRINTED, localization=summarize_localization(score))
 
 
 def worst_steps(belief: Belief) -> list[int]:
@@ -214,6 +223,13 @@ def _steps(times_s: FloatArray) -> IntArray:
     )
     steps: IntArray = np.unique(np.clip(np.searchsorted(times_s, wanted - 1e-6), 0, len(times_s) - 1))
     return steps
+
+
+def _worst_declared(estimates: list[LocalizationEstimate], times_s: FloatArray, truth: Trajectory) -> int | None:
+    """The step with the largest error of those declared localized, which is shown whatever the sampling; None without one."""
+    errors_m = _errors_m(times_s, np.array([one.pose for one in estimates]), truth)
+    known = [step for step, one in enumerate(estimates) if one.localized and errors_m[step] is not None]
+    return max(known, key=lambda step: errors_m[step] or 0.0, default=None)
 
 
 def _spread(recording: Recording) -> list[int]:

@@ -2,7 +2,7 @@
 
 const CHART_LOW_M = 0.05, CHART_HIGH_M = 500; // a tyre's width, and a town's
 const CHART_LEFT = 44, CHART_TOP = 16, CHART_BOTTOM = 18;
-const PARTS = { map: "1 mapping", roads: "2 on the roads", find: "3 where am I?", follow: "localized" };
+const PARTS = { map: "1 The map grows", roads: "2 It comes right", find: "3 Where am I?", follow: "4 Localized" }; // as on the buttons
 
 function makeChart(canvas, story) {
   const pen = canvas.getContext("2d"), still = document.createElement("canvas");
@@ -33,9 +33,11 @@ function makeChart(canvas, story) {
     on.font = "12px system-ui, sans-serif";
     on.textBaseline = "middle";
     segments.forEach((one, i) => {
-      if (i % 2) { on.fillStyle = inks.panel; on.fillRect(X(one.s0), CHART_TOP, X(one.s1) - X(one.s0), size.h - CHART_TOP - CHART_BOTTOM); }
+      const part = partOf(one.kind);
+      if (["roads", "follow"].includes(part)) { on.fillStyle = inks.panel; on.fillRect(X(one.s0), CHART_TOP, X(one.s1) - X(one.s0), size.h - CHART_TOP - CHART_BOTTOM); }
       on.fillStyle = inks.soft;
-      const words = partWords(one), room = X(one.s1) - X(one.s0);
+      if (i && partOf(segments[i - 1].kind) === part) return seconds(on, one); // the part has its name already
+      const words = partWords(one), room = X(segments.filter((other) => partOf(other.kind) === part).at(-1).s1) - X(one.s0);
       const fitting = [words, words.split(" ", 2).join(" "), words.match(/^\d?/)[0]].find((text) => on.measureText(text).width < room - 4);
       if (fitting) on.fillText(fitting, X(one.s0) + 3, 8);
       seconds(on, one);
@@ -57,12 +59,12 @@ function makeChart(canvas, story) {
   }
 
   /** The name of a part; on a phone the first part leaves its room to the names of the curves. */
-  const partWords = (one) => (one.kind === "map" && size.w < 480 ? PARTS.map.slice(0, 1) : PARTS[one.kind]);
+  const partWords = (one) => (one.kind === "map" && size.w < 480 ? PARTS.map.slice(0, 1) : PARTS[partOf(one.kind)]);
 
   /** The names of the curves of the first drive in their colours, beside the name of its part, as far as there is room. */
   function nameCurves(on) {
     const first = segments.find((one) => one.kind === "map");
-    let x = first ? X(first.s0) + on.measureText(partWords(first)).width + 10 : Infinity;
+    let x = first ? X(first.s0) + on.measureText(partWords(first)).width + (size.w < 480 ? 4 : 10) : Infinity;
     for (const { path, drive, colour } of curves()) {
       const wide = on.measureText(path.name).width;
       if (drive !== 1 || x + wide + 12 > X(first.s1)) continue;

@@ -4,11 +4,27 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator
+from importlib.metadata import version
 
 from hippodrome.eval.files.scenarios import PACKAGE
 from hippodrome.eval.methods.method import SEMI_METRIC, Method, method_of
 from hippodrome.eval.report.evidence import MapEvidence
+from hippodrome.eval.report.markup import Html, element, joined
 from hippodrome.eval.results.model import ScenarioResult
+
+
+def again(command: str) -> Html:
+    """A command with a button that copies it, and where and with what it runs."""
+    where = (
+        " It works only in the folder that this page was made in, where each town's scenario.json lies: ask whoever sent it for "
+        f"that folder. The page was made by hippodrome {version('hippodrome')}; "
+    )
+    return joined(
+        element("code", command, class_="command"),
+        " ",
+        element("button", "Copy", type="button", class_="copy"),
+        element("small", where, element("code", "make setup"), " in its source installs it."),
+    )
 
 
 def command_lines(scenario: ScenarioResult, evidence: MapEvidence | None) -> Iterator[tuple[str, str]]:

@@ -6,9 +6,16 @@ function startCards(root) {
   const button = root.querySelector(".play-all");
   const cards = [...root.querySelectorAll("[data-place]")].map((card) => {
     const section = document.getElementById(card.dataset.place), story = storyOf(section), name = story.choices.at(-1) || null;
-    return { scene: makeScene(card.querySelector("canvas"), story), segments: makeSegments(story, name), name, words: card.querySelector("small") };
+    return { story, scene: makeScene(card.querySelector("canvas"), story), segments: makeSegments(story, name), name, words: card.querySelector("small") };
   }).filter((card) => card.segments.length);
   let share = 0, playing = false, last = null, waiting = false;
+
+  /** What a town's story is at: of the second drive, what its localizer says. */
+  function stateOf({ kind, t }, drive) {
+    if (!SECOND.includes(kind)) return { map: "mapping", roads: "the map comes right" }[kind];
+    if (drive.localized[before(drive.t_s, t)]) return "localized";
+    return kind === "find" ? "where am I?" : "in doubt again";
+  }
 
   function frame(now) {
     waiting = false;
@@ -17,11 +24,11 @@ function startCards(root) {
       last = now;
       if (share === 1 || !root.offsetParent) play(false);
     }
-    if (root.offsetParent) for (const { scene, segments, name, words } of cards) {
+    if (root.offsetParent) for (const { story, scene, segments, name, words } of cards) {
       const moment = momentAt(segments, share * segments.at(-1).s1);
       scene.draw(moment, name);
       performance.mark("first picture");
-      words.textContent = { map: "mapping", roads: "the map comes right", find: "where am I?", follow: "localized" }[moment.kind];
+      words.textContent = stateOf(moment, secondDrive(story, name));
     }
     if (playing) redraw();
   }
@@ -39,7 +46,14 @@ function startCards(root) {
     redraw();
   }
 
+  const stories = cards.map((card) => card.story), semi = stories.find((story) => story.semi);
+  for (const mark of root.querySelectorAll(".mark.semi")) {
+    if (semi) mark.style.background = semi.colours[semi.semi.name]; else mark.parentElement.remove();
+  }
   button.addEventListener("click", () => play(!playing));
+  const showRamp = () => { for (const mark of root.querySelectorAll(".mark.ramp")) mark.style.background = `linear-gradient(90deg, ${ramp().join(",")})`; };
+  showRamp();
+  dark.addEventListener("change", showRamp);
   new ResizeObserver(() => { cards.forEach(({ scene }) => scene.forget()); redraw(); }).observe(root);
   dark.addEventListener("change", () => { cards.forEach(({ scene }) => scene.forget()); redraw(); });
   return { begin() { if (still.matches) { share = 0.5; redraw(); } else play(true); }, at() {}, play };

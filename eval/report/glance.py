@@ -1,4 +1,4 @@
-"""What a reader wants to know first of a run: the best method, its worst place, the second drives, what failed, the command."""
+"""What a reader wants to know first of a run: the best method, its worst places, the second drives, what failed, the command."""
 
 from __future__ import annotations
 
@@ -6,10 +6,14 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from hippodrome.eval.report.commands import command_lines
+from hippodrome.eval.metrics.localization import FALSE_FIX_M
+from hippodrome.eval.report.belief import worst_steps
+from hippodrome.eval.report.caveats import doubt_lines, false_fix_lines, limit_lines, printed_false_fixes, unvouched_lines
+from hippodrome.eval.report.commands import again, command_lines
 from hippodrome.eval.report.files import ScenarioFiles
 from hippodrome.eval.report.markup import Child, Html, element, joined
 from hippodrome.eval.report.places import place_address
+from hippodrome.eval.report.remarks import given, names
 from hippodrome.eval.results.model import Results, Row, ScenarioResult
 from hippodrome.eval.results.thresholds import limits_missed
 
@@ -18,7 +22,7 @@ MOST_NAMED: Final = 6  # of scenarios in a sentence, and of troubles in the list
 
 
 def at_a_glance(results: Results, found: Sequence[ScenarioFiles]) -> Html:
-    """Five questions and their answers, from the results alone."""
+    """The questions that a reader has first, and their answers, from the results and the files beside them alone."""
     best = best_method(results)
     answers: list[tuple[str, Child]] = [("Best method", _best(results, best))]
     if worst := _worst(results, found, best):
@@ -26,8 +30,34 @@ def at_a_glance(results: Results, found: Sequence[ScenarioFiles]) -> Html:
     if localized := _localized(results, best):
         answers.append(("Second drive", localized))
     answers.append(("Refused or failed", _troubles(results)))
-    answers.append(("Run it again", joined(element("code", _command(results.scenarios)), ", typed in the folder of this page.")))
+    answers += [(name, words) for name, words in _caveats(results, found) if words]
+    has_printed = any(printed_false_fixes(one, files) is not None for one, files in zip(results.scenarios, found, strict=True))
+    answers += [("The names", names(results, has_printed)), ("What each is given", given(results))]
+    answers.append(("Run it again", again(_command(results.scenarios))))
     return element("dl", [joined(element("dt", name), element("dd", words)) for name, words in answers], class_="glance")
+
+
+def _caveats(results: Results, found: Sequence[ScenarioFiles]) -> Iterator[tuple[str, Html | None]]:
+    """What the means do not say; None for a question that does not arise."""
+    pairs = list(zip(results.scenarios, found, strict=True))
+    yield "Limits", _listed(limit_lines(results.scenarios), "None: the scenarios set none.")
+    for name, lines_of, nothing in (
+        ("Not vouched for", unvouched_lines, "Nothing: the road match vouches for every vertex of the refined maps."),
+        ("In doubt again", doubt_lines, "Never: once localized, it stayed so until the end of the drive."),
+    ):
+        known = [(one.name, lines) for one, files in pairs if (lines := lines_of(one, files)) is not None]
+        yield name, _listed([f"{town}, {line}" for town, lines in known for line in lines], nothing) if known else None
+    counted = false_fix_lines(results.scenarios, found)
+    meaning = f"How often a localizer was sure of a place more than {FALSE_FIX_M:g}{NBSP}m away from the truth:"
+    yield "False fixes", joined(meaning, _listed(counted, "")) if counted else None
+
+
+def _listed(lines: Sequence[str], nothing: str) -> Html:
+    """Lines as a list, of which the towns' tabs have those that do not fit."""
+    if not lines:
+        return joined(nothing)
+    more = [element("li", f"and {len(lines) - MOST_NAMED} more, in the towns' tabs")] if len(lines) > MOST_NAMED else []
+    return element("ul", [element("li", line) for line in lines[:MOST_NAMED]], more)
 
 
 def best_method(results: Results) -> str | None:
@@ -60,14 +90,22 @@ def _best(results: Results, best: str | None) -> Html:
     count = len(results.scenarios)
     where = "in the one town" if count == 1 else f"in {wins} of {count} towns"
     meaning = (
-        "APE (absolute position error) is how far the map puts the car from its true place, in the mean over the first drive. "
-        "Methods that do not know the roads are given the true starting pose."
+        "APE (absolute position error) is how far a map puts the car from its true place, in the mean over the vertices that the "
+        "first drive left."
     )
     return joined(element("strong", best), f" has the smallest mean APE {where}, {spread}. {meaning}")
 
 
 def _worst(results: Results, found: Sequence[ScenarioFiles], best: str | None) -> Html | None:
-    """Where the best method is worst, with a link that plays from there."""
+    """Where the best method is worst, as a map and as what a drive is localized in, with links that show it there."""
+    parts = [part for part in (_worst_of_map(results, found, best), _worst_of_drive(results, found, best)) if part]
+    if not parts:
+        return None
+    return joined(*parts, "Each town's tab shows its worst places with their camera frames, and why.")
+
+
+def _worst_of_map(results: Results, found: Sequence[ScenarioFiles], best: str | None) -> Html | None:
+    """The largest error of the best method's maps."""
     places = []
     for scenario, files in zip(results.scenarios, found, strict=True):
         layers = files.evidence.methods if files.evidence else []
@@ -77,9 +115,29 @@ def _worst(results: Results, found: Sequence[ScenarioFiles], best: str | None) -
     if not places:
         return None
     error_m, town, t_s = max(places)
-    link = element("a", "see it there", href=place_address(town, 1, t_s))
-    return joined(f"In {town}, {t_s:.0f}{NBSP}s into the first drive, {best} is {error_m:.2f}{NBSP}m off: ", link, ". ",
-                  "Each town's tab shows its worst places with their camera frames, and why.")  # fmt: skip
+    link = element("a", "see it there", href=place_address(town, 1, t_s, best or ""))
+    return joined(
+        f"Of the maps: in {town}, {t_s:.1f}{NBSP}s into the first drive, {best} is {error_m:.2f}{NBSP}m off: ", link, ". "
+    )
+
+
+def _worst_of_drive(results: Results, found: Sequence[ScenarioFiles], best: str | None) -> Html | None:
+    """The largest error of the second drives in the best method's maps, while they were declared localized."""
+    rows = [(one, files, row.localization) for one, files in zip(results.scenarios, found, strict=True) for row in one.rows
+            if row.method == best and row.localization is not None and row.localization.error_max_m is not None]  # fmt: skip
+    if not rows:
+        return None
+    town, files, located = max(rows, key=lambda one: one[2].error_max_m or 0.0)
+    words = f"Of the second drives: in {town.name} it is up to {located.error_max_m:.2f}{NBSP}m off while localized"
+    belief = next((one for one in (files.second.beliefs if files.second else ()) if one.name == best), None)
+    if belief is None or not (worst := worst_steps(belief)):
+        return joined(f"{words}. ")
+    off_m, after_s = belief.error_m[worst[0]] or 0.0, belief.t_s[worst[0]] - belief.t_s[0]
+    link = element("a", "see it there", href=place_address(town.name, 2, belief.t_s[worst[0]], belief.name))
+    if f"{off_m:.2f}" == f"{located.error_max_m:.2f}":
+        return joined(f"{words}, {after_s:.1f}{NBSP}s into it: ", link, ". ")
+    return joined(f"{words}; of the moments that this page keeps, {after_s:.1f}{NBSP}s into it is the worst, "
+                  f"{off_m:.2f}{NBSP}m: ", link, ". ")  # fmt: skip
 
 
 def _localized(results: Results, best: str | None) -> Html | None:
@@ -96,7 +154,11 @@ def _localized(results: Results, best: str | None) -> Html | None:
         errors = [one.error_mean_m for _, one in fixed if one.error_mean_m is not None]
         parts.append(f"In the map of {best}, it was localized from an unknown start after {when}")
         parts[0] += ", as soon as several views in a row agreed on one place"
-        parts += [f"from then on it was {_between(errors)} off in the mean"] if errors else []
+        parts += (
+            [f"from then on, while it declared itself localized, it was {_between(errors)} off in the mean"] if errors else []
+        )
+        shares = [100.0 * one.localized_share for _, one in fixed if one.localized_share is not None]
+        parts += [f"it did so in {_between(shares, '%', 1)} of all its steps"] if shares else []
     if lost:
         parts.append(f"{'it' if fixed else 'It'} was never localized in {_named(lost)}")
     return joined("; ".join(parts) + ".") if parts else None
@@ -106,7 +168,7 @@ def _troubles(results: Results) -> Html:
     """What was refused, failed or missed its limit, with the cause; or that there is no such thing."""
     lines = [(one.name, line) for one in results.scenarios for line in _trouble_lines(one)]
     if not lines:
-        return joined("Nothing: every method has a map in every town, and all limits hold.")
+        return joined("Nothing: every method has a map in every town.")
     more = [element("li", f"and {len(lines) - MOST_NAMED} more, in the towns' tabs")] if len(lines) > MOST_NAMED else []
     return element("ul", [element("li", f"{town}: {line}") for town, line in lines[:MOST_NAMED]], more, class_="failures")
 

@@ -67,8 +67,10 @@ function startMap(root) {
   /** The signs beside the names have the colours that are seen on the map: those of the errors, if vertices are coloured by them. */
   function colourSwatches() {
     for (const layer of layers) {
-      const own = layer.colour || `var(--${layer.kind === "roads" ? "road" : "truth"})`;
-      layer.swatch.style.background = layer.kind === "vertices" && byError.checked ? `linear-gradient(90deg, ${ramp().join(",")})` : own;
+      const own = layer.colour || `var(--${layer.kind === "roads" ? "road" : "truth"})`, ringed = layer.kind === "vertices" && byError.checked;
+      layer.swatch.classList.toggle("ringed", ringed);
+      layer.swatch.style.borderColor = own;
+      layer.swatch.style.background = ringed ? `linear-gradient(90deg, ${ramp().join(",")}) padding-box` : own;
     }
   }
 

@@ -64,6 +64,7 @@ function makeMapView(root, data, layers, look) {
     } else if (layer.kind === "drive") {
       dots(layer, 0.85 * radius(), (i) => layer.path.localized[i] ? layer.colour : inks.soft);
     } else {
+      if (look.byError() && layers.filter((one) => one.kind === "vertices" && one.shown).length > 1) dots(layer, 1.35 * radius(), () => layer.colour); // rims tell maps apart
       dots(layer, radius(), (i) => look.byError() && layer.path.error_m[i] !== null ? errorColour(layer.path.error_m[i]) : layer.colour);
     }
   }

@@ -8,8 +8,8 @@ from typing import Final
 from hippodrome.eval.report.markup import Html, element
 
 MEANINGS: Final = {  # by the begin of a head, without its unit; of several that fit, the longest
-    "APE": "how far the map puts the car from its true place, in metres, in the mean over the first drive. Methods that do not "
-           "know the roads are given the true starting pose",
+    "APE": "how far the map puts the car from its true place, in metres, in the mean over the vertices of the first drive. "
+           "Maps without roads are first laid on the true starting pose, and not scaled; those on the roads stay where they lie",
     "APE SE(2)": "the APE after the whole map was moved and turned to fit the truth best: shape and scale are left",
     "APE Sim(2)": "the APE after the whole map was moved, turned and scaled to fit the truth best: shape is left",
     "APE median": "the APE that half of the vertices stay below",
@@ -31,12 +31,13 @@ MEANINGS: Final = {  # by the begin of a head, without its unit; of several that
     "Places recalled": "the share of frames recognised while 99 of 100 recognitions are right",
     "Covered": "the share of the drive for which the method gave an answer",
     "Success": "whether the second drive was localized from an unknown start, and lay within 20 m of the truth as it said so",
-    "Error": "how far the believed place is from the true one, in the mean from the first fix on",
-    "Error p95": "the error that 95 of 100 steps stay below, from the first fix on",
-    "First fix (ms)": "the computing time until the second drive was localized",
-    "First fix (m driven)": "how far the second drive went until it was localized",
-    "Localized": "the share of the second drive in which the localizer said that it knows its place",
-    "False fixes": "how often the localizer was sure of a place more than 20 m away from the truth",
+    "Error": "how far the believed place is from the true one, in the mean over the steps that were declared localized, from the "
+             "first declaration within 20 m of the truth on; steps in doubt are left out",
+    "Error p95": "the error that 95 of 100 of the same steps stay below",
+    "First fix": "how long, and how far, the second drive went until it was first declared localized within 20 m of the truth",
+    "CPU of the first fix": "the computing time until then, from the first frame on, without loading the map",
+    "Localized": "the share of all steps of the second drive that were declared localized",
+    "False fixes": "separate stretches of steps that were declared localized more than 20 m away from the truth",
 }  # fmt: skip
 
 

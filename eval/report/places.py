@@ -14,7 +14,7 @@ from hippodrome.eval.report.files import ScenarioFiles
 from hippodrome.eval.report.markup import Html, element, joined
 from hippodrome.eval.report.why import WITHIN_95, Place
 
-FRAME_LABEL: Final = "camera frame at {:.0f} s"
+FRAME_LABEL: Final = "camera frame at {:.1f} s"
 NBSP: Final = "\N{NO-BREAK SPACE}"
 
 
@@ -46,19 +46,22 @@ def localization_places(files: ScenarioFiles, town: str) -> Html | None:
 
 def _vertex(layer: Layer, vertex: int, evidence: MapEvidence, place: Place | None, town: str, files: ScenarioFiles) -> Html:
     t_s, error_m = layer.t_s[vertex], layer.error_m[vertex] or 0.0
-    when = f"vertex {vertex}, {t_s:.0f}{NBSP}s into the drive"
+    when = f"vertex {vertex}, {t_s:.1f}{NBSP}s into the drive"
     words = joined(element("strong", f"{error_m:.2f}{NBSP}m off"), element("small", when))
     tile = frame_tile(evidence.thumbnails, t_s) if files.thumbnails else None
     button = element("button", tile, words, type="button", class_="goto card",
                      data_method=layer.name, data_vertex=vertex, title="Show on the map")  # fmt: skip
-    return element("div", button, _list(_vertex_facts(place)) if place else None, _link(town, 1, t_s), class_="place")
+    link = _link(town, 1, t_s, layer.name)
+    return element("div", button, _list(_vertex_facts(place)) if place else None, link, class_="place")
 
 
 def _vertex_facts(place: Place) -> list[str]:
     """What the map says of a vertex, a line each."""
     along = f", {place.position_m:.0f}{NBSP}m along it" if place.position_m is not None else ""
     lane = f" to lane {place.lane}{along}" if place.lane is not None else ""
-    facts = [f"Matched{lane}." if place.status == "matched" else f"Road match: {place.status}{lane}."]
+    facts = [
+        f"Matched{lane}." if place.status == "matched" else f"Nothing vouches for this place: road match {place.status}{lane}."
+    ]
     if place.sure_m is not None:
         facts.append(f"The map says that it is 95{NBSP}% sure within {place.sure_m:.2f}{NBSP}m.")
     if place.since_closure_m is None or place.closed_with_s is None:
@@ -66,7 +69,7 @@ def _vertex_facts(place: Place) -> list[str]:
     else:
         is_here, far = place.since_closure_m == 0.0, f"{place.since_closure_m:.0f}{NBSP}m before"
         closed = "A loop is closed here" if is_here else f"The last loop was closed {far}"
-        facts.append(f"{closed}, with the view stored at {place.closed_with_s:.0f}{NBSP}s.")
+        facts.append(f"{closed}, with the view stored at {place.closed_with_s:.1f}{NBSP}s.")
     if place.lanes:
         facts.append(f"Other lanes: {', '.join(f'{one.lane} ({one.apart_m:.1f}{NBSP}m away)' for one in place.lanes)}.")
     near = [f"{'no truth there' if one.error_m is None else f'{one.error_m:.2f}{NBSP}m off'} ({one.apart_m:.1f}{NBSP}m away)"
@@ -83,7 +86,7 @@ def _step(belief: Belief, step: int, frames: Thumbnails, evidence: MapEvidence, 
         + (
             " No view has fired yet."
             if view_s is None
-            else f" Right: the kept frame nearest to the view that fired, {view_s:.0f}{NBSP}s."
+            else f" Right: the kept frame nearest to the view that fired, {view_s:.1f}{NBSP}s."
         ),
         "It does not say how sure it was."
         if spread is None
@@ -93,16 +96,17 @@ def _step(belief: Belief, step: int, frames: Thumbnails, evidence: MapEvidence, 
     looks = files.second.looks if files.second else ()
     if views := next((look.views for look in looks if (look.method, look.t_s) == (belief.name, t_s)), None):
         facts.append(f"This frame alone resembles the views of {'; '.join(map(_resemblance, views))}.")
-    off_m, when = belief.error_m[step] or 0.0, f"{t_s:.0f}{NBSP}s into the drive"
+    off_m, when = belief.error_m[step] or 0.0, f"{t_s - belief.t_s[0]:.1f}{NBSP}s into the drive"
     words = joined(element("strong", f"{off_m:.2f}{NBSP}m off"), element("small", when))
     pictures = element("div", seen, fired, class_="pair")
-    return element("div", element("div", pictures, words, class_="card"), _list(facts), _link(town, 2, t_s), class_="place")
+    link = _link(town, 2, t_s, belief.name)
+    return element("div", element("div", pictures, words, class_="card"), _list(facts), link, class_="place")
 
 
 def _resemblance(view: ViewCandidate) -> str:
     """A candidate: when it was stored, its score, and how far from the car it lies."""
     off = "no truth" if view.off_m is None else f"{view.off_m:.1f}{NBSP}m off"
-    return f"{view.view_s:.0f}{NBSP}s (score {view.score:.1f}, {off})"
+    return f"{view.view_s:.1f}{NBSP}s (score {view.score:.1f}, {off})"
 
 
 def _sure_m(covariance_m2: tuple[float, float, float]) -> float:
@@ -116,14 +120,14 @@ def _list(facts: Sequence[str]) -> Html:
     return element("ul", [element("li", fact) for fact in facts], class_="facts")
 
 
-def _link(town: str, drive: int, t_s: float) -> Html:
-    """A link that opens the player at a time of one of the drives."""
-    return element("a", "Play from here", href=place_address(town, drive, t_s))
+def _link(town: str, drive: int, t_s: float, method: str) -> Html:
+    """A link that plays one of the drives in the map of a method, from a time on."""
+    return element("a", "Play from here", href=f"{place_address(town, drive, t_s, method)}&play=1")
 
 
-def place_address(town: str, drive: int, t_s: float) -> str:
-    """The address, within the page, of a time of one of a town's drives."""
-    return f"#town={quote(town, safe='')}&drive={drive}&t={t_s:.1f}"
+def place_address(town: str, drive: int, t_s: float, method: str) -> str:
+    """The address, within the page, of a time of one of a town's drives, in the map of a method."""
+    return f"#town={quote(town, safe='')}&drive={drive}&t={round(t_s, 2)}&map={quote(method, safe='')}"
 
 
 def frame_tile(tiles: Thumbnails, t_s: float, kind: str = "tile") -> Html:

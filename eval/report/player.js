@@ -2,6 +2,7 @@
 
 const FULL_STORY_S = 45; // the whole story takes so long at speed 1
 const KEYS = { ArrowRight: 0.005, ArrowUp: 0.005, ArrowLeft: -0.005, ArrowDown: -0.005, PageUp: 0.05, PageDown: -0.05, Home: -1, End: 1 };
+const FALSE_FIX_M = 20; // declared localized farther off than this, a drive has a false fix (eval/metrics/localization.py)
 const STATUS = ["nowhere yet: it could be anywhere", "localized", "off the map", "in doubt: the views speak for another place", "lost"];
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -41,18 +42,24 @@ function startPlayer(root) {
   const brain = find(".brain") ? makeBrain(find(".brain")) : null, strip = section.querySelector(".traces canvas");
   const traces = strip ? makeTraces(strip) : null;
   let name = story.choices.at(-1) || null, segments = [], s = 0, playing = false, last = null, waiting = false;
+  let finished = null; // the map of which a place was asked for: it is shown as it came out, and not while it grows
 
   const length = () => (segments.length ? segments.at(-1).s1 : 1);
 
   function choose(other) {
     const share = s / length();
     name = other;
+    if (finished) finished = layerOf(story, name) || null;
     segments = makeSegments(story, name);
     chart.tell(segments, name);
     find(".mark.located").style.background = story.colours[(layerOf(story, name) || { name }).name];
+    for (const button of root.querySelectorAll("[data-part]")) button.hidden = !segments.some((one) => partOf(one.kind) === button.dataset.part);
+    for (const option of find(".speed").options) option.textContent = `${Number(((option.value * length()) / FULL_STORY_S).toPrecision(2))}× real time`;
     s = share * length();
     redraw();
   }
+
+  const here = () => ({ ...momentAt(segments, s), finished });
 
   function redraw() {
     if (!waiting) { waiting = true; requestAnimationFrame(frame); }
@@ -72,51 +79,49 @@ function startPlayer(root) {
 
   function show() {
     if (!segments.length || !root.offsetParent) return;
-    const moment = momentAt(segments, s);
+    const moment = here();
     scene.draw(moment, name);
     performance.mark("first picture");
     chart.draw(s);
-    const drive = secondDrive(story, name), second = partOf(moment.kind) === "find";
+    const drive = secondDrive(story, name), second = SECOND.includes(moment.kind);
     if (traces && drive && drive.grid_rad && drive.grid_rad[0].length) traces.draw(drive, second ? moment.t : drive.t_s[0]);
     const told = tell(moment);
     slider.setAttribute("aria-valuenow", Math.round((1000 * s) / length()));
     slider.setAttribute("aria-valuetext", told.join(". "));
     find(".moment strong").textContent = told[0];
     find(".moment span").textContent = told.slice(1).join(" · ");
-    for (const button of root.querySelectorAll("[data-part]")) button.setAttribute("aria-pressed", button.dataset.part === partOf(moment.kind));
+    for (const button of root.querySelectorAll("[data-part]")) button.setAttribute("aria-pressed", button.dataset.part === partOf(moment.kind) && !(finished && moment.kind === "map"));
   }
-
-  const partOf = (kind) => (kind === "follow" ? "find" : kind);
 
   /** Show frame, view and networks of a moment, and put it into words. */
   function tell({ kind, t }) {
-    const second = kind === "find" || kind === "follow", film = films[second ? 1 : 0];
-    root.dataset.part = partOf(kind);
+    const second = SECOND.includes(kind), film = films[second ? 1 : 0], drive = secondDrive(story, name);
+    root.dataset.part = second ? "find" : kind === "map" && finished ? "made" : kind;
     find(".film").hidden = kind === "roads" || !film;
-    if (film && kind !== "roads") caption(".film", film(find(".film canvas"), t), second ? "second drive" : "first drive");
+    if (film && kind !== "roads") caption(".film", `${second ? "second" : "first"} drive, kept frame of`, film(find(".film canvas"), t) - (second ? drive.t_s[0] : 0));
     if (kind === "map") {
-      const i = story.semi ? before(story.semi.t_s, t) : -1;
-      const layer = layerOf(story, name), later = layer && layer !== story.semi ? layer.error_m[nearestInTime(layer.t_s, t)] : null;
-      const told = [`Mapping, ${t.toFixed(0)} s`, i < 0 ? "no semi-metric map" : `the semi-metric map is ${metres(story.semi.error_m[i])} off here`];
+      const map = finished || story.semi, layer = layerOf(story, name);
+      const later = !finished && layer && layer !== story.semi ? layer.error_m[nearestInTime(layer.t_s, t)] : null;
+      const told = [`First drive, ${t.toFixed(1)} s`, map ? `${offBy(`${finished ? map.name : "the semi-metric map"} is`, map.error_m[before(map.t_s, t)])} here` : "no semi-metric map"];
       return typeof later === "number" ? [...told, `${layer.name}: ${metres(later)} off`] : told;
     }
     if (kind === "roads") return ["The map comes right", `every vertex is laid on the roads: ${name}`];
-    const drive = secondDrive(story, name), i = before(drive.t_s, t), elapsed = t - drive.t_s[0];
+    const i = before(drive.t_s, t), elapsed = t - drive.t_s[0];
     const known = drive.status ? STATUS[drive.status[i]] : drive.localized[i] ? "localized" : "not localized";
     showBelief(drive, i);
     const spread = drive.covariance_m2 && drive.covariance_m2[i] && drive.localized[i] ? `, 95 % sure within ${metres(ellipseOf(drive.covariance_m2[i]).a)}` : "";
-    return [`Second drive, ${elapsed.toFixed(1)} s`, `${known}${spread}`, drive.localized[i] ? `truly ${metres(drive.error_m[i])} off` : `its guess is ${metres(drive.error_m[i])} off`];
+    return [`Second drive, ${elapsed.toFixed(1)} s`, `${known}${spread}`, offBy(drive.localized[i] ? "truly" : "its guess is", drive.error_m[i]) + (drive.localized[i] && drive.error_m[i] > FALSE_FIX_M ? ": a false fix" : "")];
   }
 
   function showBelief(drive, i) {
     const view = find(".fired"), view_s = drive.view_s ? drive.view_s[i] : null;
     view.hidden = view_s === null || !films[0];
-    if (!view.hidden) caption(".fired", films[0](view.querySelector("canvas"), view_s), `view of ${view_s.toFixed(0)} s fired; frame of`);
+    if (!view.hidden) caption(".fired", `view of ${view_s.toFixed(1)} s fired; kept frame of`, films[0](view.querySelector("canvas"), view_s));
     if (brain && drive.grid_rad && drive.grid_rad[i].length) brain.draw(drive, i);
   }
 
-  function caption(figure, t, words) {
-    find(`${figure} figcaption`).textContent = `${words}, ${t.toFixed(0)} s`.replace("of, ", "of ");
+  function caption(figure, words, t) {
+    find(`${figure} figcaption`).textContent = `${words} ${t.toFixed(1)} s`;
   }
 
   function play(on) {
@@ -143,7 +148,7 @@ function startPlayer(root) {
   /** What of this town can be saved as a picture: the moment on the map, the curves, the networks. */
   function pictures() {
     const town = section.dataset.town, then = (svg) => { redraw(); return svg; };
-    const here = () => momentAt(segments, s), drive = () => secondDrive(story, name);
+    const drive = () => secondDrive(story, name);
     const found = [[`${town}, the moment`, () => then(scene.vector(here(), name, [`${town}: ${tell(here())[0]}`, tell(here()).slice(1).join("; ")]))], [`${town}, the errors`, () => then(chart.vector())]];
     if (brain) found.push([`${town}, the networks`, () => brain.vector(drive(), before(drive().t_s, ["map", "roads"].includes(here().kind) ? Infinity : here().t))]);
     return found;
@@ -154,8 +159,8 @@ function startPlayer(root) {
     if (traces) strip.parentElement.after(saveBox([[`${section.dataset.town}, certainty of the networks`, () => { const svg = traces.vector(secondDrive(story, name)); redraw(); return svg; }]]));
     const select = find(".choice");
     for (const choice of story.choices) select.append(make("option", choice, { value: choice, selected: choice === name }));
-    if (!story.semi) for (const mark of [".own", ".gap"]) find(`.mark${mark}`).parentElement.remove();
-    if (story.semi) find(".mark.own").style.background = story.colours[story.semi.name];
+    if (!story.semi) for (const mark of root.querySelectorAll(".mark.own")) mark.parentElement.remove();
+    for (const mark of root.querySelectorAll(".mark.own")) mark.style.background = story.colours[story.semi.name];
     select.closest("label").hidden = story.choices.length < 2;
     select.addEventListener("change", () => choose(select.value));
     const modules = find("input.modules");
@@ -163,8 +168,9 @@ function startPlayer(root) {
     if (!modules) find(".mark.modules").parentElement.remove();
     find(".play").addEventListener("click", () => play(!playing));
     for (const button of root.querySelectorAll("[data-part]")) button.addEventListener("click", () => {
-      const part = segments.find((one) => one.kind === button.dataset.part) || segments.find((one) => partOf(one.kind) === button.dataset.part);
-      if (part) { s = part.s0; play(!still.matches); }
+      s = segments.find((one) => partOf(one.kind) === button.dataset.part).s0;
+      finished = null;
+      play(!still.matches);
     });
     slider.addEventListener("pointerdown", (event) => { slider.setPointerCapture(event.pointerId); seek(chart.at(event.clientX)); });
     slider.addEventListener("pointermove", (event) => { if (event.buttons) seek(chart.at(event.clientX)); });
@@ -184,10 +190,14 @@ function startPlayer(root) {
   choose(name);
   setTimeout(redraw, 200); // by then the frames are decoded
   root.dataset.ready = "yes";
-  /** Show a time of one of the two drives, and play or not. */
+  /** Show a time of one of the two drives, in the map of a method if one is named, and play or not. */
   return {
-    at(drive, t) { seek(storyTime(segments, drive, t)); },
+    at(drive, t, map) {
+      if (story.choices.includes(map)) { find(".choice").value = map; choose(map); }
+      finished = drive === 1 ? data.methods.find((layer) => layer.name === map) || null : null;
+      seek(storyTime(segments, drive, t));
+    },
     play,
-    begin() { if (!still.matches) { s = 0; play(true); } else seek(0.3 * length()); },
+    begin() { finished = null; if (!still.matches) { s = 0; play(true); } else seek(0.3 * length()); },
   };
 }

@@ -5,30 +5,39 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from hippodrome.eval.report.belief import AS_PRINTED
 from hippodrome.eval.report.files import ScenarioFiles
 from hippodrome.eval.report.markup import Html, data_script, element, joined
 from hippodrome.eval.report.tables import anchor
 from hippodrome.eval.results.model import Results, ScenarioResult
 
+# player.js writes them as factors of real time, of which a long drive's story has more.
 SPEEDS = (("0.25", "¼ speed"), ("0.5", "½ speed"), ("1", "1× speed"), ("2", "2× speed"), ("4", "4× speed"))
-PARTS = (("map", "1 The map grows"), ("roads", "2 It comes right"), ("find", "3 The car finds itself"))
+SLOWER: Final = "The second drive is told more slowly until it is localized, and for six seconds after"
+# The curves have the same names above them (chart.js).
+PARTS = (("map", "1 The map grows"), ("roads", "2 It comes right"), ("find", "3 Where am I?"), ("follow", "4 Localized"))
 EXPLAINED = (  # what is seen in the parts of the story that leave room for it
     ("map", "The car drives through the town; the line behind it is its true path. From camera and wheels alone it makes a map: "
             "streets connect as they should, but lengths and turns are wrong, so the map lies off the roads. "
             "The dashed line is the error at this moment."),
     ("roads", "The map is laid on the road network: every vertex moves to the place at which the roads explain the drive best. "
               "Its colour is what is left of its error."),
+    ("made", "The car drives its first way once more in the finished map, whose vertices have the colours of their errors. "
+             "The dashed line is the error at this moment."),
 )  # fmt: skip
 MARKS = (  # sign, meaning, and the parts of the story in which it is seen
-    ("road", "roads", "map roads find"),
-    ("truth", "true path", "map roads find"),
-    ("own", "semi-metric map", "map roads"),
-    ("gap", "error now", "map"),
-    ("ramp", "laid on the roads, by error: 0.1 to 100 m", "roads"),
+    ("road", "roads", "map made roads"),
+    ("truth", "true path", "map made roads find"),
+    ("car", "true car", "map made find"),
+    ("own", "semi-metric map, and the car in it", "map"),
+    ("own", "semi-metric map", "roads"),
+    ("gap", "error now", "map made"),
+    ("ramp", "laid on the roads, by error: 0.1 to 100 m", "roads made"),
+    ("arrow", "believed car", "find"),
     ("located", "localized path", "find"),
     ("fix", "belief (95 %)", "find"),
     ("view", "view that fired", "find"),
-    ("modules", "places of each grid module alone", "find"),
+    ("modules", "places by each grid module", "find"),
 )
 # The signs of the three grid modules as scene.js draws them: square, diamond, circle.
 MODULE_SIGNS: Final = Html(
@@ -49,9 +58,14 @@ BRAIN_PARTS = (  # equations are those of Li et al. 2025
 COLOURS: Final = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#5b3a9e")
 MODULES = 3  # sheets that there is room for; a belief with fewer hides the others
 
-CARD_WORDS = joined(
-    "The plain dot is the car. Blue is its map, which grows and is then laid on the roads. ",
-    "At the end a second drive finds itself in it.",
+CARD_MARKS = (  # what is seen on the cards, which leave the views and the grid modules to the towns' own pages
+    ("truth", "true path"),
+    ("car", "true car"),
+    ("own semi", "semi-metric map, and where it has the car"),
+    ("gap", "error now"),
+    ("ramp", "map on the roads, by error: 0.1 to 100 m"),
+    ("arrow", "second drive: where the car believes it is"),
+    ("fix", "95 % of its belief"),
 )
 
 
@@ -76,7 +90,7 @@ def player(files: ScenarioFiles) -> Html | None:
 def method_colours(files: ScenarioFiles) -> dict[str, str]:
     """The colour of each method that the map shows, by its name."""
     layers = files.evidence.methods if files.evidence else []
-    return {layer.name: COLOURS[place % len(COLOURS)] for place, layer in enumerate(layers)}
+    return {layer.name: COLOURS[place % len(COLOURS)] for place, layer in enumerate(layers)} | {AS_PRINTED: COLOURS[5]}
 
 
 def brain_at_work(files: ScenarioFiles) -> Html | None:
@@ -104,25 +118,24 @@ def towns(results: Results, found: Sequence[ScenarioFiles], places: Sequence[int
     if not cards:
         return None
     button = element("button", "▶ Play all", type="button", class_="play-all", aria_pressed="false")
-    words = element("small", CARD_WORDS, class_="soft")
-    return element(
-        "div", element("div", cards, class_="town-cards"), element("div", button, words, class_="transport"), class_="towns"
-    )
+    signs = [element("li", element("i", class_=f"mark {kind}"), words) for kind, words in CARD_MARKS]
+    below = element("div", button, element("ul", signs, class_="legend"), class_="transport")
+    return element("div", element("div", cards, class_="town-cards"), below, class_="towns")
 
 
 def _card(place: int, scenario: ScenarioResult) -> Html:
     """A town with the figures of its last row that has a map, which is what a run is about."""
     best = next((row for row in reversed(scenario.rows) if row.ape is not None), None)
-    words = f"{best.method}: {best.ape.mean_m:.2f} m off in the mean" if best and best.ape else "no map"
+    words = f"{best.method}: mean map error (APE) {best.ape.mean_m:.2f} m" if best and best.ape else "no map"
     if best is not None and best.refused is not None:
         words = f"{best.method}: refused"
     where = best.localization if best else None
     found = (
         ""
         if where is None
-        else f"localized after {where.initial_drive_s:.1f} s"
+        else f"second drive: found its place after {where.initial_drive_s:.1f} s"
         if where.initial_drive_s is not None
-        else "never localized"
+        else "second drive: never found its place"
     )
     canvas = element("canvas", role="img", aria_label=f"{scenario.name}: the story of its map")
     return element("a", element("span", canvas, class_="stage-map"), element("strong", scenario.name), element("small", ""),
@@ -136,8 +149,8 @@ def _moment() -> Html:
 
 def _legend() -> Html:
     """What the marks mean; the colours are those of the map's layers."""
-    signs = {kind: MODULE_SIGNS if kind == "modules" else element("i", class_=f"mark {kind}") for kind, _, _ in MARKS}
-    items = [element("li", signs[kind], words, data_in=parts) for kind, words, parts in MARKS]
+    signs = [MODULE_SIGNS if kind == "modules" else element("i", class_=f"mark {kind}") for kind, _, _ in MARKS]
+    items = [element("li", sign, words, data_in=parts) for sign, (_, words, parts) in zip(signs, MARKS, strict=True)]
     return element("ul", items, class_="legend")
 
 
@@ -177,7 +190,7 @@ def _transport(has_modules: bool) -> Html:
         "div",
         element("button", "▶ Play", type="button", class_="play", aria_pressed="false"),
         parts,
-        element("select", speeds, class_="speed", aria_label="Speed"),
+        element("select", speeds, class_="speed", aria_label="Speed", title=SLOWER),
         element("label", "Map ", element("select", class_="choice")),
         element("label", element("input", type="checkbox", checked=True, class_="modules"), " grid modules")
         if has_modules

@@ -13,6 +13,7 @@ from hippodrome.eval.report.glance import at_a_glance
 from hippodrome.eval.report.markup import Html, element, joined
 from hippodrome.eval.report.pages import page
 from hippodrome.eval.report.player import towns
+from hippodrome.eval.report.remarks import lede, surprises, title
 from hippodrome.eval.report.sections import scenario_section
 from hippodrome.eval.report.tables import anchor, overview
 from hippodrome.eval.results.model import Results, read_results
@@ -57,10 +58,11 @@ def report_html(results: Results, out: Path) -> str:
     quoted = quoted_rows()
     found = [read_scenario_files(out, scenario.name) for scenario in results.scenarios]
     sections = [scenario_section(place, one, quoted, found[place]) for place, one in enumerate(results.scenarios)]
-    links = [element("a", "Compare", href=f"#{COMPARE}")]
+    links = [element("a", "All compared", href=f"#{COMPARE}")]
     links += [element("a", one.name, href=f"#{anchor(place)}") for place, one in enumerate(results.scenarios)]
     body = [
-        element("header", element("h1", "Topometric maps, scored"), element("nav", links, class_="tabs", aria_label="Towns")),
+        element("header", element("h1", title(_maps(results))), element("div", element("span", "Towns:", aria_hidden="true"),
+                element("nav", links, class_="tabs", aria_label="Towns"), class_="choose-town")),
         element("main", _all_scenarios(results, found, (out / DRIVE_PAGE).exists()), sections),
         element("footer", "Made by ", element("code", _maker(results)), "; ", element("code", "hippodrome report DIR"),
                 " makes it again from results.json and the files beside it."),
@@ -70,34 +72,29 @@ def report_html(results: Results, out: Path) -> str:
 
 def _all_scenarios(results: Results, found: Sequence[ScenarioFiles], has_drives: bool) -> Html:
     """The first panel: what was done, every town at a look, and one line of figures for each; then the missions."""
-    missions = mission_overview(results)
-    bare = [without_missions(one) for one in results.scenarios]
-    kept = [place for place, one in enumerate(bare) if one.rows or missions is None]
-    maps = Results(scenarios=tuple(bare[place] for place in kept))
+    missions, maps = mission_overview(results), _maps(results)
+    kept = [place for place, one in enumerate(results.scenarios) if without_missions(one).rows or missions is None]
     drives = element("p", element("a", "The driven ways, mission by mission", href=DRIVE_PAGE)) if has_drives else None
     return element(
         "section",
-        element("p", _lede(maps), class_="lede") if kept else None,
+        element("p", lede(maps), class_="lede") if kept else None,
         towns(maps, [found[place] for place in kept], kept) if kept else None,
         joined(element("h2", "At a glance"), at_a_glance(maps, [found[place] for place in kept])) if kept else None,
-        joined(element("h2", "All scenarios"), overview(maps, quoted_rows(), kept)) if kept else None,
+        joined(element("h2", "All scenarios"), overview(maps, quoted_rows(), kept), surprises(maps.scenarios)) if kept else None,
         joined(element("h2", TITLE), missions, drives) if missions else None,
         class_="panel",
         id=COMPARE,
     )
 
 
+def _maps(results: Results) -> Results:
+    """The scenarios with their rows of maps and localization alone; those that have none only if nobody drove missions."""
+    bare = [without_missions(one) for one in results.scenarios]
+    only_maps = mission_overview(results) is None
+    return Results(scenarios=tuple(one for one in bare if one.rows or only_maps))
+
+
 def _maker(results: Results) -> str:
     """The command that made the results."""
     has_maps = any(without_missions(one).rows for one in results.scenarios)
     return "hippodrome eval" if has_maps or not results.scenarios else "hippodrome drive"
-
-
-def _lede(results: Results) -> Html:
-    """What was done, in one sentence."""
-    count = len(results.scenarios)
-    km = sum(one.network.km for one in results.scenarios)
-    frames, drive_s = (sum(getattr(one, name) for one in results.scenarios) for name in ("frames", "duration_s"))
-    towns = "1 town" if count == 1 else f"{count} towns"
-    return joined(f"{towns} with {km:.1f} km of road, mapped from {frames:,} camera frames over {drive_s / 60:.0f} minutes of "
-                  "driving; each map refined with the road network, and a second drive localized in it.")  # fmt: skip

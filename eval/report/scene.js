@@ -125,6 +125,16 @@ function makeScene(canvas, story) {
     disc(...now, 5, inks.truth, inks.paper);
   }
 
+  /** The first drive once more in a finished map: its vertices by their errors, and how far off it is where the car passes. */
+  function drawFinished(t, layer) {
+    trail(story.data.truth, t, inks.truth, 1.6);
+    dots(layer.t_s.length, (i) => [layer.x_m[i], layer.y_m[i]], (i) => (layer.error_m[i] === null ? inks.soft : errorColour(layer.error_m[i])), dotSize());
+    const now = placeAt(story.data.truth, t), mapped = placeAt(layer, t);
+    link(mapped, now, inks.bad);
+    disc(...mapped, 5, story.colours[layer.name], inks.paper);
+    disc(...now, 5, inks.truth, inks.paper);
+  }
+
   /** The map comes right: every vertex moves from its semi-metric place to its place on the roads, the first ones first. */
   function drawRoads(share, layer) {
     const { semi } = story, moving = semi && semi.t_s.length === layer.t_s.length, count = layer.t_s.length;
@@ -155,14 +165,14 @@ function makeScene(canvas, story) {
     const stated = drive.covariance_m2 && drive.covariance_m2[i], spread = stated && ellipseOf(stated);
     if (!known && (!spread || spread.a > ANYWHERE_M)) drawVeil(colour, 0.13);
     else if (spread) drawEllipse([drive.x_m[i], drive.y_m[i]], spread, colour);
-    const view_m = drive.view_m && drive.view_m[i];
-    if (view_m) {
+    const whole = canvas.matches(".scene"), view_m = drive.view_m && drive.view_m[i]; // a card has no legend for all signs
+    if (whole && view_m) {
       pen.strokeStyle = inks.accent;
       pen.lineWidth = 2;
       pen.strokeRect(X(view_m[0]) - 6, Y(view_m[1]) - 6, 12, 12);
     }
     if (truth && truth.t_s.length) disc(...placeAt(truth, t), 5, inks.truth, inks.paper);
-    if (showModules.on) drawModules(drive, i);
+    if (whole && showModules.on) drawModules(drive, i);
     if (known) arrow(drive, i, placeAt(drive, t), colour);
   }
 
@@ -228,7 +238,7 @@ function makeScene(canvas, story) {
   function drawMoment(moment, name) {
     pen.lineJoin = "round";
     const layer = layerOf(story, name);
-    if (moment.kind === "map") drawMapping(moment.t);
+    if (moment.kind === "map") moment.finished ? drawFinished(moment.t, moment.finished) : drawMapping(moment.t);
     else if (moment.kind === "roads") drawRoads(moment.t, layer);
     else drawSecond(moment.t, layer, secondDrive(story, name));
   }

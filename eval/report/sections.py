@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hippodrome.eval.report import comparison
+from hippodrome.eval.report.belief import AS_PRINTED
+from hippodrome.eval.report.caveats import town_caveats
 from hippodrome.eval.report.commands import command_lines
 from hippodrome.eval.report.drives import TITLE, mission_table, without_missions
 from hippodrome.eval.report.evidence import MapEvidence
@@ -15,6 +17,7 @@ from hippodrome.eval.report.markup import Child, Html, data_script, element, joi
 from hippodrome.eval.report.meanings import meanings
 from hippodrome.eval.report.places import localization_places, mapping_places
 from hippodrome.eval.report.player import brain_at_work, method_colours, player
+from hippodrome.eval.report.remarks import surprises
 from hippodrome.eval.report.tables import (
     anchor,
     break_table,
@@ -28,9 +31,13 @@ from hippodrome.eval.report.tables import (
 from hippodrome.eval.results.aligned import aligned_note
 from hippodrome.eval.results.model import Row, ScenarioResult
 from hippodrome.eval.results.tables import LOCALIZATION_COLUMNS, MAPPING_COLUMNS, definitions, failed_runs, unscored_notes
-from hippodrome.eval.results.thresholds import limits_missed
+from hippodrome.eval.results.thresholds import limits_in_words, limits_missed
 
 NBSP = "\N{NO-BREAK SPACE}"
+PRINTED = (
+    f"{AS_PRINTED}: the second drive in the map of topometric, localized by the attractor networks exactly as the paper prints "
+    "them. It makes no map, and so has no row above."
+)
 WIDE_PX = 1400  # a figure that is wider is given a row of its own, else its letters are too small
 FLAT = 1.45  # and one that is so many times as wide as high, as curves over time are
 MEANING = {"cpu_s": "s of CPU", "step_ms": "ms a step"}  # of a time, by the end of its name
@@ -56,12 +63,15 @@ def scenario_section(place: int, scenario: ScenarioResult, quoted: Sequence[Row]
         player(files),
         element("p", _driven(scenario), class_="note"),
         failures,
+        town_caveats(scenario, files),
         _headline(scenario, colours),
         _undrawn(scenario, colours),
         element("h3", "Mapping (Table I)"),
         mapping_table(scenario, quoted, colours),
         element("p", note, class_="note") if (note := aligned_note(rows)) is not None else None,
+        surprises([scenario]),
         _titled("Localization from an unknown start (Table II)", localization_table(scenario, quoted, colours)),
+        element("p", PRINTED, class_="note") if scenario.as_printed is not None else None,
         _titled("Ten sequences from unknown starts (Table II)", comparison.sequences(files.sequences)),
         _titled("Cheaper than ORB-SLAM3", comparison.ratios(files.ratios)),
         _titled("What each method is given", comparison.fairness(scenario)),
@@ -106,6 +116,7 @@ def _driven(scenario: ScenarioResult) -> str:
     return (
         f"{town}, with {network.km:.1f}{NBSP}km of road; seed {scenario.seed}, noise level {scenario.noise}. "
         f"The first drive took {scenario.duration_s:,.0f}{NBSP}s and {scenario.frames:,} camera frames."
+        + (f" Limits: {words}." if (words := limits_in_words(scenario)) else "")
     )
 
 
@@ -130,7 +141,7 @@ def _folded(title: str, content: Child) -> Html:
 def _verdict(scenario: ScenarioResult) -> Html | None:
     """Whether the scenario's own limits hold."""
     failed = limits_missed(scenario)
-    if failed is None:
+    if failed is None or not (failed or limits_in_words(scenario)):
         return None
     return element("span", "limits failed", class_="badge bad") if failed else element("span", "limits hold", class_="badge good")
 
@@ -196,6 +207,7 @@ def _interactive_map(files: ScenarioFiles) -> Html:
         element("fieldset", element("legend", "Layers"), class_="layers"),
         element("label", element("input", type="checkbox", checked=True, class_="by-error"), "colour vertices by APE"),
         element("div", class_="colourbar"),
+        element("small", "Vertices coloured by APE have a rim in their method's colour where several maps are shown."),
         element("label", "Vertex ", element("input", type="range", min=0, value=0, class_="scrub")),
         element("div", class_="tile", role="img", hidden=True) if files.thumbnails else None,
         element("p", "Hover over a vertex, click to keep it and see its camera frame.", class_="vertex", aria_live="polite"),

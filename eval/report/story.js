@@ -1,8 +1,12 @@
 // The story of a run: the first drive is mapped, the map comes right on the roads, the second drive is found in it. No drawing here.
 
-const ROADS_SHARE = 0.14; // of the story's length that the map takes to come right
-const SETTLING = 6; // so many times slower than the rest, as the localizer finds itself within seconds
+const ROADS_SHARE = 0.15; // of the first drive's length that the map takes to come right: there is room for the part's name
+const SETTLING = 6; // so many times slower than the rest, at least, as the localizer finds itself within seconds
+const FIND_SHARE = 0.14; // and so much of the first drive's length, at least, for the same reason
 const AFTER_FIX_S = 6; // of the second drive that are still told slowly after the first fix
+const SECOND = ["find", "settled", "follow"]; // kinds of the segments of the second drive
+/** The part of the story that a segment belongs to: the fourth one begins slowly, with the first fix. */
+const partOf = (kind) => (kind === "settled" ? "follow" : kind);
 
 /** The layers, drives and segments that the player tells, from the content of map.json and of belief.json (null without one). */
 function makeStory(data, second) {
@@ -34,9 +38,11 @@ function makeSegments(story, name) {
   if (story.refined.length && segments.length) add("roads", 0, 1, ROADS_SHARE * segments[0].s1);
   if (drive && drive.t_s.length > 1) {
     const fix = drive.localized.indexOf(true), [t0, t1] = [drive.t_s[0], drive.t_s.at(-1)];
-    const middle = fix < 0 ? t0 : Math.min(t1, drive.t_s[fix] + AFTER_FIX_S);
-    if (middle > t0) add("find", t0, middle, SETTLING * (middle - t0));
-    if (t1 > middle) add("follow", middle, t1, t1 - middle);
+    const found = fix < 0 ? t1 : drive.t_s[fix], slow = Math.min(t1, found + AFTER_FIX_S);
+    if (fix < 0) add("find", t0, t1, t1 - t0); // never localized: nothing to be told slowly
+    else if (found > t0) add("find", t0, found, Math.max(SETTLING * (found - t0), FIND_SHARE * (segments[0]?.s1 || 0)));
+    if (slow > found) add("settled", found, slow, SETTLING * (slow - found));
+    if (t1 > slow) add("follow", slow, t1, t1 - slow);
   }
   return segments;
 }
@@ -51,16 +57,17 @@ function secondDrive(story, name) {
 function momentAt(segments, s) {
   const segment = segments.find((one) => s < one.s1) || segments.at(-1);
   const share = Math.min(1, Math.max(0, (s - segment.s0) / (segment.s1 - segment.s0)));
-  return { kind: segment.kind, t: segment.t0 + share * (segment.t1 - segment.t0) };
+  const t = segment.t0 + share * (segment.t1 - segment.t0);
+  return { kind: segment.kind, t: Math.round(1e6 * t) / 1e6 }; // so that a vertex's own time is not an instant before it
 }
 
 /** The story time of a time of the first drive (drive 1) or the second (drive 2). */
 function storyTime(segments, drive, t) {
-  const kinds = drive === 2 ? ["find", "follow"] : ["map"];
+  const kinds = drive === 2 ? SECOND : ["map"];
   const own = segments.filter((one) => kinds.includes(one.kind));
   if (!own.length) return 0;
-  const one = own.find((segment) => t <= segment.t1) || own.at(-1);
-  return one.s0 + Math.min(1, Math.max(0, (t - one.t0) / Math.max(one.t1 - one.t0, 1e-9))) * (one.s1 - one.s0);
+  const one = own.find((segment) => t < segment.t1) || own.at(-1); // the end of one is the begin of the next
+  return one.s0 + Math.min(1 - 1e-9, Math.max(0, (t - one.t0) / Math.max(one.t1 - one.t0, 1e-9))) * (one.s1 - one.s0);
 }
 
 /** A position on a timed path, linear in time. */
@@ -79,5 +86,8 @@ function ellipseOf([xx, xy, yy]) {
 
 function metres(value) {
   if (value === null || value === undefined) return "no truth near";
-  return `${value < 10 ? value.toFixed(2) : value < 1000 ? value.toFixed(1) : Math.round(value)} m`;
+  return `${value < 1000 ? value.toFixed(2) : Math.round(value)} m`;
 }
+
+/** How far something is from the truth, in words that follow its name. */
+const offBy = (verb, value) => (value === null || value === undefined ? "no truth near" : `${verb} ${metres(value)} off`);

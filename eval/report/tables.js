@@ -48,8 +48,8 @@ function asLatex(heads, rows) {
 function meaningOf(table, text) {
   const section = table.closest("section"), plain = [...(section ? section.querySelectorAll(".meanings li") : [])].find((one) => one.dataset.head === text);
   if (plain) return textOf(plain);
-  const name = text.replace(/ (median|p95|max)\b/, "").replace(/ \((m|m driven|ms|%)\)$/, "");
-  const aliases = { Error: "localization", "Error p95": "localization", "First fix": "localization", Localized: "localization" };
+  const name = text.replace(/ (median|p95|max)\b/, "").replace(/ \((m|[ms] driven|ms|%)\)$/, "");
+  const aliases = { Error: "localization", "Error p95": "localization", "First fix": "localization", Localized: "localization", "CPU of the first fix": "localization" };
   const wanted = (aliases[name] || name).toLowerCase();
   return [...(section ? section.querySelectorAll(".definitions li") : [])].map(textOf).filter((line) => line.toLowerCase().startsWith(`${wanted} (`)).join("; ");
 }

@@ -93,13 +93,16 @@ def overview(results: Results, quoted: Sequence[Row], places: Sequence[int]) -> 
     """
     measured = list(dict.fromkeys(row.method for scenario in results.scenarios for row in scenario.rows))[::-1]  # ours first
     localizing = [method for method in measured if any(_located(_row(one, method)) for one in results.scenarios)]
+    shaped = [method for method in measured if any(_shape(_row(one, method)) != NONE for one in results.scenarios)]
     groups: list[tuple[str, Sequence[str]]] = [("Scenario", ()), ("Mean APE of the map (m)", measured)]
+    groups += [("Mean APE after the best fit with a scale, Sim(2) (m)", shaped)] if shaped else []
     groups += [("Mean localization error (m)", localizing)] if localizing else []
     groups += [("Road (km)", ()), ("Drive (s)", ()), ("Frames", ())]
     rows: list[Sequence[Child]] = [
         [
             element("a", scenario.name, href=f"#{anchor(place)}"),
             *_best_marked([_ape(_row(scenario, method)) for method in measured]),
+            *_best_marked([_shape(_row(scenario, method)) for method in shaped]),
             *_best_marked([_location_error(_row(scenario, method)) for method in localizing]),
             f"{scenario.network.km:.1f}",
             f"{scenario.duration_s:,.0f}",
@@ -122,8 +125,9 @@ def mapping_table(scenario: ScenarioResult, quoted: Sequence[Row], colours: Mapp
 
 
 def localization_table(scenario: ScenarioResult, quoted: Sequence[Row], colours: Mapping[str, str]) -> Html | None:
-    """Localization from an unknown start (the paper's Table II); None if nothing was localized."""
-    rows = [row for row in (*reversed(scenario.rows), *quoted) if row.localization is not None]
+    """Localization from an unknown start (the paper's Table II), that by the networks as printed below; None without any."""
+    printed = [scenario.as_printed] if scenario.as_printed is not None else []
+    rows = [row for row in (*reversed(scenario.rows), *printed, *quoted) if row.localization is not None]
     return _row_table(LOCALIZATION_COLUMNS, rows, f"{scenario.name}: localization", colours) if rows else None
 
 
@@ -134,7 +138,9 @@ def break_table(scenario: ScenarioResult) -> Html | None:
         for row in scenario.rows
         for one in _dictionaries(getattr(row, "breaks", None))
     ]
-    return plain_table(["Method", "Vertices", "Status", "Cause"], rows, "breaks") if rows else None
+    table = plain_table(["Method", "Vertices", "Status", "Cause"], rows, "breaks")
+    words = "Nothing vouches for these vertices: they lie where wheels and views put them beside those that are matched."
+    return joined(element("p", words, class_="note"), table) if rows else None
 
 
 def row_heads(columns: Sequence[Column], rows: Sequence[Row]) -> list[str]:
@@ -206,6 +212,11 @@ def _ape(row: Row | None) -> Child:
     if row.ape is None:
         return NONE if row.places is not None else element("span", "FAILED", class_="bad")
     return element("span", f"REFUSED ({row.ape.mean_m:.2f})", class_="bad") if row.refused else f"{row.ape.mean_m:.2f}"
+
+
+def _shape(row: Row | None) -> str:
+    """Mean APE after the best similarity fit."""
+    return NONE if row is None or row.ape_sim2 is None else f"{row.ape_sim2.mean_m:.2f}"
 
 
 def _location_error(row: Row | None) -> Child:

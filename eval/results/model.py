@@ -150,6 +150,7 @@ class ScenarioResult(_Model):
     frames: int  # of the mapping drive
     duration_s: float  # of the mapping drive
     rows: tuple[Row, ...]
+    as_printed: Row | None = None  # the second drive in our map by the networks as the paper prints them; no map of its own
 
 
 class Results(_Model):

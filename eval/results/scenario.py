@@ -12,13 +12,16 @@ from hippodrome.eval.methods.method import SEMI_METRIC
 from hippodrome.eval.results.model import Network, Row, ScenarioResult
 
 
-def scenario_result(materials: Materials, rows: Sequence[Row], outcomes: Sequence[Outcome]) -> ScenarioResult:
+def scenario_result(
+    materials: Materials, rows: Sequence[Row], outcomes: Sequence[Outcome], as_printed: Row | None = None
+) -> ScenarioResult:
     """One entry of ``results.json``.
 
     Args:
         materials: What was evaluated.
         rows: The rows, in the order of the tables.
         outcomes: What the methods came to, for the times of their stages.
+        as_printed: How the networks as the paper prints them localized the second drive, if they were tried.
     """
     scenario = materials.scenario
     recordings = {"mapping": materials.mapping, "localization": materials.drive}
@@ -30,6 +33,7 @@ def scenario_result(materials: Materials, rows: Sequence[Row], outcomes: Sequenc
         frames=materials.mapping.frame_count,
         duration_s=materials.duration_s,
         rows=tuple(rows),
+        as_printed=as_printed,
         tours={role: recording.manifest.get("tour") for role, recording in recordings.items()},
         town_notes=list(materials.town.notes),
         configuration=effective_configuration(scenario),

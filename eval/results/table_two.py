@@ -24,7 +24,7 @@ HEAD: Final = (
     "Sequence",
     "Length (m)",
     "Success",
-    "First fix (ms)",
+    "CPU of the first fix (ms)",
     "First fix (m driven)",
     "Error (m)",
     "False fixes",

@@ -142,8 +142,9 @@ LOCALIZATION_COLUMNS = (
     Column("Success", _success),
     Column("Error (m)", lambda row: _localization(row, _figure, "error_mean_m")),
     Column("Error p95 (m)", lambda row: _localization(row, _figure, "error_p95_m")),
-    Column("First fix (ms)", lambda row: _localization(row, _figure, "initial_time_ms")),
+    Column("First fix (s driven)", lambda row: _localization(row, lambda value: _figure(value, 1), "initial_drive_s")),
     Column("First fix (m driven)", lambda row: _localization(row, lambda value: _figure(value, 1), "initial_distance_m")),
+    Column("CPU of the first fix (ms)", lambda row: _localization(row, _figure, "initial_time_ms")),
     Column("Localized (%)", lambda row: _localization(row, _percent, "localized_share")),
     Column("False fixes", lambda row: _localization(row, _count, "false_fixes")),
 )

@@ -18,12 +18,51 @@ AT_MOST: Final = (
 
 def limits_missed(result: ScenarioResult) -> list[str] | None:
     """One line per limit of the scenario's own that does not hold; None if it has none, or none that this version can read."""
+    limits = _own_limits(result)
+    return None if limits is None else failed_limits(limits, result)
+
+
+def limits_in_words(result: ScenarioResult) -> str | None:
+    """What the scenario's own limits ask for, in one line; None if they ask for nothing, or this version cannot read them."""
+    limits = _own_limits(result)
+    if limits is None:
+        return None
+    maps = "" if is_driven(result) else _in_words(limits)
+    missions = _missions_in_words(limits.drive) if any(drive_of(row) is not None for row in result.rows) else ""
+    return "; ".join(filter(None, (maps, missions))) or None
+
+
+def _own_limits(result: ScenarioResult) -> Thresholds | None:
     configuration = getattr(result, "configuration", None)
     limits = configuration.get("thresholds") if isinstance(configuration, dict) else None
     try:
-        return failed_limits(Thresholds.model_validate(limits), result) if limits else None
+        return Thresholds.model_validate(limits) if limits else None
     except ValidationError:  # results of another version: their limits may have other names
         return None
+
+
+def _in_words(limits: Thresholds) -> str:
+    asked = [
+        f"{name} at most {limit:g}{unit}"
+        for name, limit, unit in (
+            ("mean APE", limits.ape_mean_m, " m"),
+            ("mean RPE", limits.rpe_mean_m, " m"),
+            ("mean localization error", limits.localization_error_mean_m, " m"),
+            ("false fixes", limits.false_fixes, ""),
+        )
+        if limit is not None
+    ]
+    asked += ["second drive localized"] if limits.localization_success else []
+    return f"{limits.method}: {', '.join(asked)}" if asked else ""
+
+
+def _missions_in_words(limits: MissionLimits) -> str:
+    asked = [
+        f"{name.replace('_', ' ')} at {'least' if name in AT_LEAST else 'most'} {limit:g}"
+        for name in (*AT_LEAST, *AT_MOST)
+        if (limit := getattr(limits, name)) is not None
+    ]
+    return f"missions of {limits.row}: {', '.join(asked)}" if asked else ""
 
 
 def failed_limits(limits: Thresholds, result: ScenarioResult) -> list[str]:

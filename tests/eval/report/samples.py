@@ -3,7 +3,8 @@
 import cv2
 import numpy as np
 
-from hippodrome.eval.results.model import Results, write_results
+from hippodrome.eval.report.belief import AS_PRINTED
+from hippodrome.eval.results.model import LocalizationSummary, Results, Row, write_results
 from tests.eval.report.test_player import second_drive
 from tests.eval.report.test_report import HOSTILE, evidence, scenario
 
@@ -12,7 +13,9 @@ SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="90" height="60"><rect widt
 
 def write_run(folder):
     """Results and the files beside them."""
-    write_results(folder / "results.json", Results(scenarios=(scenario("town & co"), scenario(HOSTILE))))
+    lost = LocalizationSummary(definition="d", success=False, false_fixes=2, localized_share=0.5)
+    towns = (scenario("town & co", as_printed=Row(method=AS_PRINTED, localization=lost)), scenario(HOSTILE))
+    write_results(folder / "results.json", Results(scenarios=towns))
     town = folder / "town & co"
     town.mkdir()
     picture = np.full((60, 90, 3), 200, np.uint8)

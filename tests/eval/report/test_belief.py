@@ -61,6 +61,13 @@ def test_the_belief_is_what_the_localizer_said():
     assert made.grid_rad[0] == list(range(12)) and made.head_reliability[0] == [4.0, 5.0]
 
 
+def test_the_worst_moment_that_was_declared_localized_is_kept_whatever_the_sampling():
+    estimates = [estimate(step, off_m=90.0 if step in (3, 303) else 3.0) for step in range(STEPS)]  # the first is no declaration
+    made = belief_of("topometric", estimates, TRUTH, COGNITIVE_MAP)
+    assert [t_s for t_s, error_m in zip(made.t_s, made.error_m, strict=True) if error_m == 90.0] == [pytest.approx(303 * STEP)]
+    assert made.t_s == sorted(made.t_s) and STEP * 303 % STEP_S > 1e-6
+
+
 def test_the_view_that_fired_is_the_first_vertex_that_has_it():
     made = belief_of("topometric", [estimate(step) for step in range(3)], TRUTH, COGNITIVE_MAP)
     assert (made.view_s[0], made.view_m[0]) == (None, None)  # no cell is active

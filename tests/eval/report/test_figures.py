@@ -43,7 +43,8 @@ LOCALIZATION = {
     "Success": ("localization.success", 1.0),
     "Error (m)": ("localization.error_mean_m", 1.0),
     "Error p95 (m)": ("localization.error_p95_m", 1.0),
-    "First fix (ms)": ("localization.initial_time_ms", 1.0),
+    "CPU of the first fix (ms)": ("localization.initial_time_ms", 1.0),
+    "First fix (s driven)": ("localization.initial_drive_s", 1.0),
     "First fix (m driven)": ("localization.initial_distance_m", 1.0),
     "Localized (%)": ("localization.localized_share", PERCENT),
     "False fixes": ("localization.false_fixes", 1.0),
@@ -154,6 +155,9 @@ def test_the_tables_of_each_town(tree, scenarios, kind, columns):
         (box,) = tables(section(tree, place), f"{scenario['name']}: {kind}")
         shown = [line for line in lines(box) if not line["Method"].endswith("†")]
         wanted = [name for name in reversed(by_method) if kind == "mapping" or by_method[name]["localization"] is not None]
+        if kind == "localization" and (printed := scenario["as_printed"]) is not None:
+            by_method[printed["method"]] = printed
+            wanted.append(printed["method"])
         assert [re.sub(r" \((FAILED|REFUSED)\)$", "", line["Method"]) for line in shown] == wanted
         for line, method in zip(shown, wanted, strict=True):
             for head, text in line.items():
@@ -177,6 +181,10 @@ def test_the_tiles_and_the_cards_and_the_table_of_all_towns(tree, scenarios):
         for method, text in zip(methods, cells[1:], strict=False):
             if (ape_m := value_at(by_method.get(method), "ape.mean_m")) is not None:
                 assert is_told(text, ape_m), f"{method}: {text}"
+        shapes_m = [value_at(by_method.get(method), "ape_sim2.mean_m") for method in methods]
+        if any(shape_m is not None for shape_m in shapes_m):
+            for text, shape_m in zip(cells[1 + len(methods) :], shapes_m, strict=False):
+                assert is_told(text, shape_m), f"Sim(2): {text}"
         assert is_told(cells[-3], scenario["network"]["km"])
         assert is_told(cells[-2], scenario["duration_s"]) and is_told(cells[-1], scenario["frames"])
         for tile in section(tree, place).all("div", class_="figure-tile"):
@@ -192,9 +200,9 @@ def test_the_tiles_and_the_cards_and_the_table_of_all_towns(tree, scenarios):
     for card in tree.all("a", class_="town"):
         scenario = scenarios[int(card.attributes["data-place"].removeprefix("scenario-")) - 1]
         best = [row for row in scenario["rows"] if row["ape"] is not None][-1]
-        found = re.search(r"([\d.,]+) m off in the mean", card.text())
+        found = re.search(r"mean map error \(APE\) ([\d.,]+) m", card.text())
         assert found and is_told(found[1], best["ape"]["mean_m"])
-        if found := re.search(r"localized after ([\d.,]+) s", card.text()):
+        if found := re.search(r"found its place after ([\d.,]+) s", card.text()):
             assert is_told(found[1], best["localization"]["initial_drive_s"])
 
 
@@ -235,7 +243,43 @@ def test_the_worst_places_are_those_of_the_map(tree, folder, scenarios):
             layer, vertex = layers[button.attributes["data-method"]], int(button.attributes["data-vertex"])
             assert vertex in layer.worst
             assert is_told(next(button.all("strong")).text().removesuffix(" m off"), layer.error_m[vertex])
-            assert f"{layer.t_s[vertex]:.0f} s into the drive" in button.text()
+            assert f"{layer.t_s[vertex]:.1f} s into the drive" in button.text()
+
+
+def glance(tree):
+    """The answers at a glance by their questions."""
+    (found,) = tree.all("dl", class_="glance")
+    nodes = [child for child in found.children if isinstance(child, Node)]
+    return {question.text(): answer.text() for question, answer in zip(nodes[::2], nodes[1::2], strict=True)}
+
+
+def test_the_answers_at_a_glance(tree, scenarios):
+    said = glance(tree)
+    best = said["Best method"].partition(" has the smallest")[0]
+    rows = [row for one in scenarios for row in one["rows"] if row["method"] == best]
+    located = [row["localization"] for row in rows if row["localization"]]
+    errors_m = [one["error_mean_m"] for one in located if one["error_mean_m"] is not None]
+    for words, values in ((said["Best method"], [row["ape"]["mean_m"] for row in rows if row["ape"]]),
+                          (said["Second drive"].partition("it was ")[2], errors_m)):  # fmt: skip
+        least, most = re.search(r"([\d.]+)(?: to ([\d.]+))? m\b", words).groups()
+        assert is_told(least, min(values)) and is_told(most or least, max(values))
+    worst_m = [one["error_max_m"] for one in located if one["error_max_m"] is not None]
+    assert not worst_m or is_told(re.search(r"up to ([\d.]+) m", said["Worst place"])[1], max(worst_m))
+
+
+def test_what_nothing_vouches_for_and_false_fixes_are_counted_as_in_the_results(tree, scenarios):
+    said = glance(tree)
+    for scenario in scenarios:
+        for row in scenario["rows"]:
+            breaks = row.get("breaks")
+            if isinstance(breaks, list) and breaks:
+                count = sum(one["last_vertex"] - one["first_vertex"] + 1 for one in breaks)
+                assert f"{scenario['name']}, {row['method']}: {count}" in said["Not vouched for"].replace(",000", "000")
+        printed = [scenario["as_printed"]] if scenario["as_printed"] else []
+        for row in (*scenario["rows"], *printed):
+            if row["localization"] and row["localization"]["false_fixes"]:
+                line = said["False fixes"].partition(f"{row['method']}: ")[2]
+                assert f"{row['localization']['false_fixes']} in {scenario['name']}" in line
 
 
 def test_a_figure_that_differs_is_found():

@@ -82,7 +82,7 @@ def test_a_change_is_shown_and_told(browser, versus, width, dark):
     tab = browser.open(versus.as_uri(), width=width, dark=dark)
     assert tab.run("document.querySelector('.said').textContent") == "0 of 29 vertices better, 1 worse"
     tab.run("document.querySelector('.places button').click()")
-    assert tab.run("document.querySelector('.said').textContent").endswith("A 9.00 m, B 14.0 m: 5.00 m worse")
+    assert tab.run("document.querySelector('.said').textContent").endswith("A 9.00 m, B 14.00 m: 5.00 m worse")
     tab.run("document.querySelector('.choice').focus()")
     tab.press("ArrowUp")
     look_at(tab)

@@ -81,7 +81,7 @@ def test_a_belief_in_the_map_of_another_method_is_a_choice_of_its_own(browser, r
 
 def test_candidates_stand_below_the_worst_moments(report):
     text = Page(report.read_text(encoding="utf-8")).text().replace("\N{NO-BREAK SPACE}", " ")
-    assert "This frame alone resembles the views of 30 s (score 4.5, 0.5 m off); 0 s (score 2.0, no truth)" in text
+    assert "This frame alone resembles the views of 30.0 s (score 4.5, 0.5 m off); 0.0 s (score 2.0, no truth)" in text
 
 
 def test_no_script_makes_markup_of_data(report):
@@ -99,7 +99,63 @@ def test_an_address_opens_a_time_of_the_second_drive(browser, report):
     half_axis_m = 2.4477 * np.sqrt(np.linalg.eigvalsh([[1.0, 0.2], [0.2, 2.0]])[-1])
     assert "Second drive, 40.0 s" in said["words"] and f"95 % sure within {half_axis_m:.2f} m" in said["words"]
     assert "truly 1.50 m off" in said["words"]
-    assert said["fired"] == "view of 30 s fired; frame of 30 s"
+    assert said["fired"] == "view of 30.0 s fired; kept frame of 30.0 s"
+
+
+WORDS = """const words = () => panel.querySelector(".moment").textContent, choice = panel.querySelector(".choice"),
+    playing = () => panel.querySelector(".play").getAttribute("aria-pressed");"""
+
+
+def test_a_link_shows_the_map_that_it_names_and_its_error(browser, report):
+    """On the first drive, too, where the finished map is shown, be it one of a method without a second drive."""
+    for name, error in (("topometric", "29.00"), ("dead reckoning", "29.00")):
+        script = f"""{WORDS} say("words", words()); say("plays", playing());
+            say("part", panel.querySelector(".player").dataset.part);
+            panel.querySelector('button[data-part="map"]').click(); await wait(); say("grows", words());"""
+        address = f"town=town%20%26%20co&drive=1&t=60.0&map={name.replace(' ', '%20')}"
+        said, console = after(browser, report, script, address)
+        assert console == [] and said["words"] == f"First drive, 60.0 s{name} is {error} m off here"
+        assert (said["part"], said["plays"]) == ("made", "false")
+        assert said["grows"].startswith("First drive") and name not in said["grows"]
+
+
+def test_play_from_here_plays_and_a_link_that_was_followed_before_works_again(browser, report):
+    script = f"""{WORDS} const link = panel.querySelectorAll('.place a')[1]; link.click(); await wait(); say("plays", playing());
+        say("first", words()); panel.querySelector('.play').click(); panel.querySelector('button[data-part="find"]').click();
+        link.click(); await wait(); say("again", words());"""
+    said, console = after(browser, report, script, "scenario-1")
+    assert console == [] and said["plays"] == "true"
+    assert said["first"].startswith("First drive") and said["again"].startswith("First drive")
+    tab = browser.open(f"{report.as_uri()}#scenario-1", still=True)
+    tab.run("document.querySelectorAll('.place a')[1].click()")
+    tab.until("document.querySelector('.moment').textContent.startsWith('First drive')")
+    assert tab.run("document.querySelector('.play').ariaPressed") == "false", "less motion is asked for"
+    tab.close()
+
+
+def test_the_parts_have_the_same_names_on_buttons_and_curves_and_the_fourth_begins_with_the_fix(browser, report):
+    script = f"""{WORDS} const buttons = [...panel.querySelectorAll("button[data-part]")];
+        say("same", buttons.every((one) => PARTS[one.dataset.part] === one.textContent));
+        buttons.at(-1).click(); await wait(); panel.querySelector(".play").click(); await wait(); say("words", words());
+        say("speeds", [...panel.querySelector(".speed").options].every((one) => /^[\\d.]+× real time$/.test(one.textContent)));
+        const story = storyOf(panel), drive = secondDrive(story, "topometric"), fix = drive.localized.indexOf(true);
+        say("fix", makeSegments(story, "topometric").find((one) => one.kind === "settled").t0 === drive.t_s[fix]);
+        const drives = [{{ ...drive, localized: drive.localized.map(() => false) }}];
+        const lost = {{ ...story, second: null, data: {{ ...story.data, drives }} }};
+        say("lost", makeSegments(lost, "topometric").map((one) => one.kind).join(" "));"""
+    said, console = after(browser, report, script, "scenario-1")
+    assert console == [] and (said["same"], said["speeds"], said["fix"]) == ("true", "true", "true")
+    assert said["words"].startswith("Second drive") and "localized, 95 % sure" in said["words"]
+    assert said["lost"] == "map roads find"
+
+
+def test_headings_are_linked_at_the_top_of_a_town_and_open_by_address(browser, report):
+    script = """const links = [...panel.querySelectorAll(".contents a")];
+        say("names", links.map((one) => one.textContent).join("|"));
+        say("all", links.length === panel.querySelectorAll("h3").length); say("town", panel.dataset.town);"""
+    said, console = after(browser, report, script, "scenario-1-2")
+    assert console == [] and (said["all"], said["town"]) == ("true", "town & co")
+    assert said["names"].startswith("Mapping|Localization|")
 
 
 def test_every_control_moves_the_story(browser, report):

@@ -40,7 +40,8 @@ def scenario(name, **fields):
         row("dead reckoning", 50.0),
         row("semi-metric", 40.0, vertices=VERTICES),
         Row(method="topometric (paper)", failure=f"no route {HOSTILE}"),
-        row("topometric", 0.5, localization=LocalizationSummary(definition="d", success=True, error_mean_m=0.25),
+        row("topometric", 0.5, localization=LocalizationSummary(definition="d", success=True, error_mean_m=0.25, error_max_m=1.5,
+                                                                initial_drive_s=12.4, false_fixes=0),
             breaks=[{"first_vertex": 3, "last_vertex": 5, "status": "NO_ROUTE", "cause": HOSTILE}]),
     )  # fmt: skip
     extra = {"configuration": {"note": HOSTILE, "thresholds": {"method": "topometric", "ape_mean_m": 0.4}},

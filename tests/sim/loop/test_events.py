@@ -8,7 +8,7 @@ import pytest
 
 from hippodrome.core.navigation.types import Indicator, Lamp
 from hippodrome.core.types import HippodromeError
-from hippodrome.sim.loop.radar import nearest_ahead
+from hippodrome.sim.loop.radar import nearest_ahead, nearest_behind_m
 from hippodrome.sim.loop.types import EventKind, LanePlace
 from hippodrome.sim.loop.users import Users
 from hippodrome.sim.loop.world import World
@@ -160,3 +160,16 @@ def test_the_radar_follows_the_steering_and_looks_no_further_than_a_right_angle(
     assert gap(20.0, 4.0, 2.0 * 4.0 / (20.0**2 + 4.0**2))[0] < 20.0
     assert gap(-20.0, 0.0, 0.0)[0] == math.inf
     assert gap(0.0, 10.0, 0.2)[0] == math.inf
+
+
+def test_the_radar_sees_whom_the_outer_corner_swings_into():
+    def users(x, y, heading=0.0):
+        return Users(("a",), np.array([1]), np.array([0], np.uint8), np.array([[x, y, heading]]), np.array([0.0]))
+
+    pose, lock = (0.0, 0.0, 0.0), 1.0 / 3.0
+    assert nearest_ahead(pose, lock, users(5.2, -2.2, 0.5 * math.pi))[0] < 1.0  # the front right corner comes there
+    assert nearest_ahead(pose, lock, users(5.6, -2.2, 0.5 * math.pi))[0] == math.inf
+    beside = users(1.5, -2.4)  # parallel, half a metre beside: no way to back with the wheels at full lock
+    assert nearest_behind_m(pose, 0.0, beside) == math.inf
+    assert nearest_behind_m(pose, lock, beside) < 2.0
+    assert nearest_behind_m(pose, lock, users(1.5, -4.5)) == math.inf

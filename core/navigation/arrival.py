@@ -99,7 +99,7 @@ class Arrival:
         plan = belief.plan = self._planner.plan(belief.track.pose, 0.0, beyond_goal=True)
         gate = None if plan is None else plan.gate()
         has_looked = 0.0 <= belief.since_fix_m - self._looked_m < AGAIN_M
-        if plan is None or gate is None or has_looked:
+        if plan is None or gate is None or has_looked or belief.since_fix_m <= self._config.drive.settled_m:
             return
         least_m, wanted_m = (gate.entry_u_m - plan.u_m - sees_m for sees_m in SEES_END_M)
         if least_m < LOOK_M[1] and wanted_m > LOOK_M[0]:

@@ -12,7 +12,7 @@ from hippodrome.core.navigation.speed import stopping_mps
 from hippodrome.core.navigation.types import Indicator, Radar
 
 LOOK_S = 0.6  # braking begins so early: the speed follows the wanted one with a lag of 1 / speed_gain, .67 s
-GOAL_BRAKING_MPS2 = 1.2  # gentle, since the last metre counts
+GOAL_BRAKING_MPS2 = 1.8  # gentler than elsewhere, since the last metre counts
 CHANGE_INDICATED_M = 25.0  # before a lane change
 BARRED = "waits: somebody stands beyond the junction"
 TURN_SIGMA_M = 0.6  # a turn is driven as ever where its place along the way is known so well: a corner forgives about twice that

@@ -16,10 +16,11 @@ from hippodrome.sim.loop.users import Users
 
 SIGHT_M: Final = 90.0  # so far from its junction a vehicle is seen coming: nine seconds at 10 m/s
 LINKS_AHEAD: Final = 3  # junctions that a vehicle is followed through: short streets between split junctions
+LANES_INSIDE: Final = 4  # in a row, in a junction: netconvert makes up to three, and the road is one more
 PATIENCE_S: Final = 5.0  # whoever stands so long at the junction, though he might go, waits for somebody else
 MARGIN_S: Final = 1.0  # between the ego's rear and the next vehicle
 FOE_ACCEL_MPS2: Final = 1.0  # others may become this much faster on their way
-OWN_ACCEL_MPS2: Final = 1.5  # with which the ego is taken to drive through
+OWN_ACCEL_MPS2: Final = 1.8  # with which the ego is taken to drive through
 OWN_BRAKING_MPS2: Final = 2.0  # and to brake before a bend
 STRAIGHT_MPS, BEND_MPS = 8.0, 4.5  # and the speeds at which it is taken to do so
 BEND_RAD: Final = math.radians(35.0)
@@ -110,7 +111,7 @@ def _way_to(
     junction: str, name: str, here: str, along_m: float, rights: Rights, lane_of: Mapping[str, int]
 ) -> tuple[int, float, str] | None:
     """The lane inside the junction that a vehicle will take, its way to there, and the letter of the signal before it."""
-    distance = libsumo.lane.getLength(here) - along_m if here else math.inf
+    distance = _to_links_m(here) - along_m if here else math.inf
     for onward, _, _, _, via, state, _, length in libsumo.vehicle.getNextLinks(name)[:LINKS_AHEAD]:
         if distance > SIGHT_M:
             return None
@@ -119,6 +120,21 @@ def _way_to(
             return lane, max(distance, 0.0), state
         distance += length + libsumo.lane.getLength(onward)
     return None
+
+
+def _to_links_m(lane: str) -> float:
+    """From the beginning of a lane to the first of SUMO's next links: these begin at the end of the road.
+
+    For who is inside a junction that is the end of the road after it, which SUMO's list does not have.
+    """
+    length = float(libsumo.lane.getLength(lane))
+    for _ in range(LANES_INSIDE):
+        links = libsumo.lane.getLinks(lane) if lane.startswith(":") else ()
+        if not links:
+            break
+        lane = links[0][4] or links[0][0]  # the next lane inside, or the one beyond
+        length += float(libsumo.lane.getLength(lane))
+    return length
 
 
 @dataclass(frozen=True, slots=True)

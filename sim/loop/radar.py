@@ -17,7 +17,7 @@ from hippodrome.sim.loop.users import Users
 
 REACH_M: Final = 100.0  # of an ordinary 77 GHz radar, in town
 BESIDE_M: Final = 0.3  # so much room is kept on each side of the ego's own swept path
-SWING_BESIDE_M: Final = 0.05  # and so much where a corner swings out beyond that: in sharp bends nobody has more to spare
+SWING_BESIDE_M: Final = -0.1  # and so much where a corner swings out beyond that: in bends one passes others by a hand
 MOST_TURN_RAD: Final = 0.5 * math.pi  # the swept path ends where it has turned by a right angle
 GAP_NOISE_M: Final = 0.1  # standard deviations of a measurement
 SPEED_NOISE_MPS: Final = 0.1

@@ -45,7 +45,7 @@ class DriveConfig:
     """How the vehicle is driven."""
 
     lateral_mps2: float = 2.0  # in bends; passengers accept 2.5
-    acceleration_mps2: float = 2.2
+    acceleration_mps2: float = 1.8
     braking_mps2: float = 2.0  # planned braking
     firm_braking_mps2: float = 4.0  # braking for what could not be foreseen; up to there one stops before a junction
     speed_share: float = 0.97  # of the speed limit: the speed is known to a few per cent only
@@ -53,7 +53,7 @@ class DriveConfig:
     doubt_mps: float = 4.0  # while the place is doubted
     unsure_m: float = 2.0  # standard deviation of the position from which on the vehicle slows down
     doubt_sigma_m: float = 3.0  # and from which on it doubts its place
-    yaw_rate_radps: float = 0.6  # tight turns are driven slowly enough to turn the wheels in time
+    yaw_rate_radps: float = 0.5  # tight turns are driven slowly enough to turn the wheels in time
     creep_mps: float = 1.2
     error_decay_m: float = 3.0  # distance over which an offset from the path fades at low speed
     error_decay_s: float = 0.6  # and the time it takes at least

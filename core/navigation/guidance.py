@@ -54,7 +54,7 @@ NEAR_GOAL_M: Final = 25.0  # whoever is not sure of the place does not stop at t
 AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of the way, which must not lead off the road
 OFF_ROAD, OFF_ROAD_LOOKS = 0.15, 2
 FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 30.0  # a place so sure over so much way is a fix
-SAME_PLACE_M, GUIDED_MPS, GUESSED_MPS = 12.0, 8.0, 3.0  # hypotheses so near to the goal are of one place
+SAME_PLACE_M, GUIDED_MPS, GUESSED_MPS = 12.0, 6.0, 2.0  # hypotheses so near to the goal are of one place
 REASON, GUESS = "drives where all likely places have a lane", "creeps where most likely places have a lane"
 
 

@@ -17,13 +17,14 @@ import numpy as np
 from hippodrome.core import se2
 from hippodrome.core.navigation.agreement import WAY_STEP_M, LaneField, agreed_m, lane_field
 from hippodrome.core.navigation.border import OTHER, UNKNOWN
+from hippodrome.core.navigation.caution import turn_mps
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.course import Course, make_course, path_poses, place_on
 from hippodrome.core.navigation.driving import pace
 from hippodrome.core.navigation.junctions import gate_speed_mps
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
 from hippodrome.core.navigation.places import Place
-from hippodrome.core.navigation.placing import lane_of
+from hippodrome.core.navigation.placing import keeps_left, lane_of
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2, stopping_mps
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
@@ -44,6 +45,8 @@ WAY_M: Final = 45.0  # of a way that is driven: another one is looked for before
 AGREED, GUESSED = 0.9, 0.6  # share of the poses that have a lane where the way is; with less, it is driven at a walk
 GUESS_FITS: Final = 0.85  # where the ground fits worse, even what all places agree on is a guess
 SEEN_M, SEEN, NOT_ROAD = (2.0, 8.0), 0.7, 0.05  # of a guess: so much must have been seen, and hardly any of it be no road
+CAUTION_M: Final = (1.0, 14.0)  # of the way it is looked at whether the road may bend away
+NEW_AFTER_M: Final = 3.0  # driven on sight before a way is driven again: at a corner ways come and go
 BEFORE_END_M: Final = 0.3  # the bumper stops so far before a stop line or a junction's mouth that is seen
 LEAST_M, SPARE_M = 5.0, 2.5  # of a way that is agreed on; and what is left over of it when the vehicle stops
 LIKELY: Final = 0.5  # share of a place from which the way to the goal is driven
@@ -79,6 +82,9 @@ class Guide:
         self._off_road, self._is_off_road = 0, False
         self._turned_round = self._sees_road = False
         self._end_m = math.inf  # to the end of the lane that was seen last
+        self._most_mps = math.inf  # where the road may bend away
+        self._side = 1.0 if keeps_left(planner.roads) else -1.0
+        self._on_sight_m = 0.0  # since a way was driven last
         self.places_given_up = 0  # that were followed
 
     @property
@@ -139,6 +145,8 @@ class Guide:
         self._check_footing(senses.footing.is_off_road)
         self._see_end(senses.reading, distance_m)
         self._since_look_m, self._since_try_m = self._since_look_m + abs(distance_m), self._since_try_m + abs(distance_m)
+        self._most_mps = self._cautious_mps(senses) if held is None else math.inf
+        self._on_sight_m += abs(distance_m) if self._on_sight_m > 0.0 else 0.0
         if self._since_look_m >= 1.0:
             self._look(senses, held is None)
             self._since_look_m = 0.0
@@ -184,6 +192,13 @@ class Guide:
         path = path_poses(self.plan.course, self.plan.u_m + SEEN_M[0], self.plan.u_m + SEEN_M[1])
         kinds = senses.ground.kinds_at(strip(se2.between(self.pose, path), HALF_BODY_M))
         return bool(np.mean(kinds != UNKNOWN) > SEEN and np.mean(kinds == OTHER) < NOT_ROAD)
+
+    def _cautious_mps(self, senses: Senses) -> float:
+        """The speed at which to go towards a bend that no likely place has there."""
+        if self.plan is None or self.pose is None:
+            return math.inf
+        path = path_poses(self.plan.course, self.plan.u_m + CAUTION_M[0], self.plan.u_m + CAUTION_M[1])
+        return turn_mps(senses.ground, se2.between(self.pose, path), self._side)
 
     def _follow(self, best: Place) -> None:
         """Take the pose to the particles about it, or give it up for a place that is much likelier."""
@@ -281,13 +296,16 @@ class Guide:
         if left_m < LEAST_M - 1.0 or self.whereabouts.fits < GUESS_FITS:
             left_m = max(left_m, self.guessed_m - self._since_look_m) if self._sees_road else 0.0
             most_mps, reason = GUESSED_MPS, GUESS
-        if self.plan is None or self.pose is None or left_m < LEAST_M - 1.0:
+        is_new = 0.0 < self._on_sight_m < NEW_AFTER_M
+        if self.plan is None or self.pose is None or left_m < LEAST_M - 1.0 or is_new:
+            self._on_sight_m = max(self._on_sight_m, 0.01)
             return None
+        self._on_sight_m = 0.0
         step = pace(self.plan.course, self.plan.u_m, speed_mps, radar, 0.0, config.drive, config.vehicle)
         agreed_mps = max(stopping_mps(left_m - SPARE_M, config.drive.braking_mps2), config.drive.creep_mps)
         seen_m = self._end_m - config.vehicle.front_m - BEFORE_END_M
         seen_mps, why = gate_speed_mps(seen_m, speed_mps, radar, config.drive)
-        wanted = min(step.speed_mps, most_mps, agreed_mps, seen_mps)
+        wanted = min(step.speed_mps, most_mps, agreed_mps, seen_mps, self._most_mps)
         if wanted < min(most_mps, agreed_mps):
             reason = (why if seen_mps <= step.speed_mps else step.reason) or reason
         accel = min(

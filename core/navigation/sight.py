@@ -29,6 +29,7 @@ from hippodrome.core.navigation.border import (
     room_fields,
     seen_ground,
 )
+from hippodrome.core.navigation.rounding import rounded
 from hippodrome.core.navigation.sweep import drivable
 from hippodrome.core.types import FloatArray, Frame, UInt8Array
 from hippodrome.core.views.config import CameraGeometry
@@ -179,10 +180,9 @@ class Ground:
         seen = seen_ground(part)
         field, room = room_fields(part)
         line = along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
+        led = rounded(np.ascontiguousarray(line[:, :3]), bend_1pm, side, room, corner_m, CELL_M)
         bends = sorted(STANDING_BENDS_1PM, key=lambda one: abs(one - bend_1pm)) if stands else [bend_1pm]
-        tried = [
-            drivable(room, seen, corner_m, CELL_M, self.pose, one, np.ascontiguousarray(line[:, :3]), need_m) for one in bends
-        ]
+        tried = [drivable(room, seen, corner_m, CELL_M, self.pose, one, led, need_m, side) for one in bends]
         rows = max(tried, key=len)
         free_m = sweep.STEP_M * len(rows) if len(rows) < sweep.STEPS else math.inf
         unseen = np.flatnonzero(rows[:, 3] > 0.0)

@@ -172,3 +172,15 @@ def _joined(
         rows[count, 2] = line[at, 2] + side * math.atan(off * 6.0 * u * (1.0 - u) / BACK_M)
         k, count, driven_m = k + 1, count + 1, driven_m + STEP_M
     return rows
+
+
+@njit(cache=True)
+def bends_of(line: FloatArray, room: FloatArray, corner: FloatArray, cell_m: float, need_m: float, count: int) -> FloatArray:
+    """Curvature and heading (count, 2) of a line, as ``rounded`` makes them; no rows where the car would have less than the room."""
+    rows = np.zeros((count, 2))
+    for k in range(count):
+        if room_m(room, corner, cell_m, line[k, 0], line[k, 1], line[k, 2]) < need_m:
+            return rows[:0]
+        turn = (line[k + 1, 2] - line[k, 2] + math.pi) % (2.0 * math.pi) - math.pi
+        rows[k, 0], rows[k, 1] = turn / STEP_M, line[k, 2]
+    return rows

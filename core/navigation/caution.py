@@ -1,4 +1,4 @@
-"""How fast to go where a way is driven by what is likely, and not by what is known: the road may bend away before it does."""
+"""Ways that are driven by what is likely, and not by what is known: whether they are seen to be road, and how fast to go."""
 
 from __future__ import annotations
 
@@ -7,19 +7,35 @@ from typing import Final
 
 import numpy as np
 
-from hippodrome.core.navigation.border import OTHER, ROAD
+from hippodrome.core.navigation.border import OTHER, ROAD, UNKNOWN
 from hippodrome.core.navigation.sight import Ground
+from hippodrome.core.navigation.ways import strip
 from hippodrome.core.types import FloatArray
 
+SEEN, NOT_ROAD = 0.7, 0.05  # so much of a guess must have been seen, and hardly any of it be no road
+AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of a way, which must not lead off the road
+OFF_ROAD: Final = 0.15  # of it
 LEAST_PLACES: Final = 2  # of a way that are seen to be no road: one alone is a speck
 ACROSS_M: Final = 9.0  # from where a turn begins to what lies across: a road of 6.4 m, and the way in which the wheels turn
 CORNER_M: Final = 4.5  # from where the wheels begin to turn to where the border ends: sharp corners are begun 2.8 m before
 TURN_MPS: Final = 2.5  # at which the wheels can be turned in that way
 BRAKING_MPS2: Final = 2.5  # comfortable
-BESIDE_M: Final = np.arange(1.0, 2.7, 0.2)  # from a way, where the border on the own side is looked for
+BESIDE_M: Final[FloatArray] = np.arange(1.0, 2.7, 0.2)  # from a way, where the border on the own side is looked for
 GAP_PLACES: Final = 4  # places of a way without a border beside them, from which on it has ended: not a dent in it
 BEYOND_M: Final = (6.4, 8.0)  # beyond the end of the border the road goes on, if there is road
 GOES_ON: Final = 0.6  # so much of that must be seen, and be road
+
+
+def seems_road(ground: Ground, ahead: FloatArray) -> bool:
+    """Whether a way (n, 3), in the vehicle's axes, has been seen, and to be road."""
+    kinds = ground.kinds_at(strip(ahead, HALF_BODY_M))
+    return bool(np.mean(kinds != UNKNOWN) > SEEN and np.mean(kinds == OTHER) < NOT_ROAD)
+
+
+def leads_off_road(ground: Ground, ahead: FloatArray) -> bool:
+    """Whether a way (n, 3), in the vehicle's axes, is seen to lead where there is no road."""
+    near = ahead[(ahead[:, 0] > AHEAD_M[0]) & (np.hypot(ahead[:, 0], ahead[:, 1]) < AHEAD_M[1])]
+    return len(near) > 0 and ground.off_road_share(strip(near, HALF_BODY_M)) > OFF_ROAD
 
 
 def turn_mps(ground: Ground, ahead: FloatArray, side: float) -> float:

@@ -51,7 +51,7 @@ def _corner(line: FloatArray, side: float) -> tuple[int, int]:
 
 @njit(cache=True)
 def _bend(pose: FloatArray, now: float, curvature: float, turn: float, side: float) -> FloatArray:
-    """Poses (n, 3) of a bend from a pose, where the curvature is ``now``, to the own side: it rises, holds, and falls to nothing."""
+    """Poses (n, 3) of a bend to the own side from a pose, where the curvature is ``now``: it rises, holds, and falls again."""
     x, y, heading, bend, turned = pose[0], pose[1], pose[2], now, 0.0
     poses = np.zeros((MOST_ROWS, 3))
     poses[0] = pose
@@ -114,13 +114,14 @@ def rounded(line: FloatArray, now: float, side: float, room: FloatArray, corner:
                 best, cost, start_m = at_once, price, 0.0
         turned = _bend(begin, 0.0, curvature, side * (end[2] - begin[2]), side)
         for before in BEFORE_M:
-            aside = before if straight else beside
+            aside = before if straight else 0.0
             x, y = side * sin * aside, -side * cos * aside
             for after in AFTER_M:
                 back_m = ((x + turned[-1, 0] - end[0]) * out_x + (y + turned[-1, 1] - end[1]) * out_y - after) / along
                 price = BEFORE_COST * aside**2 + AFTER_COST * (after + INSIDE_M) ** 2
                 begin_m = first * STEP_M - back_m
-                if begin_m < 0.0 or abs(aside - beside) > SWING * begin_m or price >= cost:
+                swings = straight and abs(aside - beside) > SWING * begin_m
+                if begin_m < 0.0 or swings or price >= cost:
                     continue
                 bend = turned.copy()
                 bend[:, 0] += x - back_m * cos
@@ -176,7 +177,7 @@ def _joined(
 
 @njit(cache=True)
 def bends_of(line: FloatArray, room: FloatArray, corner: FloatArray, cell_m: float, need_m: float, count: int) -> FloatArray:
-    """Curvature and heading (count, 2) of a line, as ``rounded`` makes them; no rows where the car would have less than the room."""
+    """Curvature and heading (count, 2) of a line, as ``rounded`` makes them; no rows where the car has less than that room."""
     rows = np.zeros((count, 2))
     for k in range(count):
         if room_m(room, corner, cell_m, line[k, 0], line[k, 1], line[k, 2]) < need_m:

@@ -162,9 +162,7 @@ def _braking(config: DriveConfig, speed_mps: float, ahead_m: FloatArray) -> Floa
     return falls
 
 
-def _wheels_mps(
-    bends_1pm: FloatArray, bend_1pm: float, speed_mps: float, config: DriveConfig, vehicle: VehicleShape
-) -> float:
+def _wheels_mps(bends_1pm: FloatArray, bend_1pm: float, speed_mps: float, config: DriveConfig, vehicle: VehicleShape) -> float:
     """The highest speed now at which the wheels can be turned as the way wants, braking in time before where they turn fast."""
     angle = np.arctan(vehicle.wheelbase_m * np.concatenate([[bend_1pm], bends_1pm]))
     rate = np.abs(angle[SPAN:] - angle[:-SPAN]) / (SPAN * STEP_M)

@@ -73,7 +73,7 @@ def drivable(
         bend: curvature at which the wheels stand.
         line: (n, 3) places and headings of the line to keep to.
         need_m: room that the car must have; where it has less now, it may not get less.
-        side: on which the border is that the line keeps to: -1 right, +1 left. Away from it lies the oncoming lane; 0 for neither.
+        side: of the border that the line keeps to: -1 right, +1 left. Away from it lies the oncoming lane; 0 for neither.
 
     Returns:
         Fewer than ``STEPS`` rows where there is no way on.

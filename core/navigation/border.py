@@ -55,7 +55,8 @@ def borders(part: UInt8Array) -> UInt8Array:
     to_found = cv2.distanceTransform(1 - found, cv2.DIST_L2, 5)
     near = (to_found <= GAP_CELLS).astype(np.uint8)
     closed = (cv2.distanceTransform(near, cv2.DIST_L2, 5) > GAP_CELLS) & (seen == 0)
-    free, barred = (part == ROAD) & (found == 0), (part == OTHER) | (found > 0)
+    rims = cv2.dilate(paint * (1 - found), BESIDE)  # of dashes and stop lines, which are brighter than road
+    free, barred = (part == ROAD) & (found == 0), ((part == OTHER) & (rims == 0)) | (found > 0)
     to_free, to_barred = (cv2.distanceTransform(1 - kind.astype(np.uint8), cv2.DIST_L2, 5) for kind in (free, barred))
     behind = (seen == 0) & (to_barred < to_free)
     return np.asarray(found | closed.astype(np.uint8) | behind.astype(np.uint8), dtype=np.uint8)

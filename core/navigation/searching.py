@@ -128,7 +128,7 @@ def search_step(
     wanted, reason = config.search_mps, "looks for known ground"
     first_m = STRAIGHT_M if in_lane else 0.0  # up to there the lane is driven, and not the border
     ahead = np.abs(bends[min(int(first_m / STEP_M), len(bends) - 1) :])
-    braking = _braking(config, speed_mps, first_m + STEP_M * np.arange(len(ahead)))
+    braking = _braking(config, speed_mps, first_m, len(ahead))
     wanted = min(wanted, float(np.min(np.sqrt(SEARCH_LATERAL * config.lateral_mps2 / np.maximum(ahead, 1e-3) + braking))))
     wanted = min(wanted, _wheels_mps(bends, bend_1pm, speed_mps, config, vehicle))
     if way.seen_m < LOOK_M:
@@ -156,8 +156,9 @@ def _agrees(memory: LaneMemory, turned_rad: FloatArray) -> bool:
     return bool(np.max(np.abs(turned_rad - lane_rad)) < AGREES_RAD)
 
 
-def _braking(config: DriveConfig, speed_mps: float, ahead_m: FloatArray) -> FloatArray:
-    """By how much (n,) the square of the speed [m^2/s^2] can fall over distances ahead; what is wanted is followed with a lag."""
+def _braking(config: DriveConfig, speed_mps: float, first_m: float, count: int) -> FloatArray:
+    """By how much (n,) the square of the speed [m^2/s^2] can fall over ``STEP_M`` after ``STEP_M``; it is followed with a lag."""
+    ahead_m = first_m + STEP_M * np.arange(count, dtype=np.float64)
     falls: FloatArray = 2.0 * config.braking_mps2 * np.maximum(ahead_m - LAG_S * speed_mps, 0.0)
     return falls
 
@@ -167,7 +168,7 @@ def _wheels_mps(bends_1pm: FloatArray, bend_1pm: float, speed_mps: float, config
     angle = np.arctan(vehicle.wheelbase_m * np.concatenate([[bend_1pm], bends_1pm]))
     rate = np.abs(angle[SPAN:] - angle[:-SPAN]) / (SPAN * STEP_M)
     most = np.maximum(WHEEL_RATE_RADPS / np.maximum(rate, 1e-3), config.creep_mps)
-    falls = _braking(config, speed_mps, STEP_M * np.arange(len(rate)))
+    falls = _braking(config, speed_mps, 0.0, len(rate))
     return float(np.min(np.sqrt(most**2 + falls), initial=config.search_mps))
 
 

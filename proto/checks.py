@@ -7,7 +7,7 @@ from math import prod
 
 import numpy as np
 
-from hippodrome.core.types import CognitiveMap, EdgeKind, LaneReadings, MatchStatus, RoadMatch
+from hippodrome.core.types import UNSEEN_PERCENT, CognitiveMap, EdgeKind, LaneReadings, MatchStatus, RoadMatch
 from hippodrome.proto.arrays import Array, FieldError
 
 MOST_SECONDS = 1e11  # of a time stamp: the year 5138
@@ -73,6 +73,9 @@ def _check_readings(read: LaneReadings) -> None:
         _require(np.isfinite(told) | np.isinf(spread), f"visits.lane.{value}", "not finite, though its variance is")
         _require((np.abs(told) <= MOST_METRES_READ) | ~np.isfinite(told), f"visits.lane.{value}", "farther than a camera reads")
     _require(read.end <= MOST_END, "visits.lane.end", f"outside 0..{MOST_END}")
+    if read.edge_percent is not None:
+        told = (read.edge_percent <= 100) | (read.edge_percent == UNSEEN_PERCENT)
+        _require(told, "visits.lane.edge_percent", f"outside 0..100, and not {UNSEEN_PERCENT}")
 
 
 def _check_road_match(match: RoadMatch) -> None:

@@ -25,6 +25,7 @@ from hippodrome.proto.checks import MAX_DESCRIPTOR_DIMENSIONS, check_map
 from hippodrome.proto.layout import (
     ATTRACTORS,
     EDGES,
+    LANE_EDGES,
     LANE_READINGS,
     REFINED_VERTICES,
     ROAD_MATCH,
@@ -161,14 +162,16 @@ def _encode_visits(visits: Visits, header: wire.Header) -> wire.Visits:
     for field, data in _packed(visits, VISITS, header).items():
         setattr(message, field, data)
     if visits.lane is not None:
-        message.lane.CopyFrom(wire.LaneReadings(**_packed(visits.lane, LANE_READINGS, header)))
+        known = LANE_READINGS if visits.lane.edge_percent is None else LANE_READINGS + LANE_EDGES
+        message.lane.CopyFrom(wire.LaneReadings(**_packed(visits.lane, known, header)))
     return message
 
 
 def _decode_visits(message: wire.Visits, header: wire.Header) -> Visits:
     visits = Visits(**_unpacked(message, VISITS, header))
     if message.HasField("lane"):
-        visits = replace(visits, lane=LaneReadings(**_unpacked(message.lane, LANE_READINGS, header)))
+        known = LANE_READINGS + LANE_EDGES if message.lane.HasField("edge_percent") else LANE_READINGS
+        visits = replace(visits, lane=LaneReadings(**_unpacked(message.lane, known, header)))
     return visits
 
 

@@ -47,6 +47,7 @@ LANE_READINGS: Layout = (
     ("end_variance_m2", "float32", ("visits",)),
     ("end", "uint8", ("visits",)),
 )
+LANE_EDGES: Layout = (("edge_percent", "uint8", ("visits", 2)),)  # which older maps do not have
 ROAD_MATCH: Layout = (
     ("lane", "int32", ("vertices",)),
     ("position_m", "float64", ("vertices",)),

@@ -198,7 +198,8 @@ def _netconvert(source: Path, plain: Path, made: Path, options: tuple[str, ...])
     except HippodromeError as error:
         if "No edges loaded" in str(error):
             return ()
-        raise HippodromeError(f"{source}: cannot be imported: {_with_cure(str(error), log)}") from error
+        reason = str(error).replace(f"{plain.parent}/", "")  # the user knows no folder of ours
+        raise HippodromeError(f"{source}: cannot be imported: {_with_cure(reason, log)}") from error
     return netconvert_notes(_lines(log), made)
 
 
@@ -216,6 +217,8 @@ def _with_cure(reason: str, log: Path) -> str:
         return f"{reason}: it cannot draw a spiral of it; write its spirals as arcs"
     if "bad_alloc" in reason or "crashed" in reason or "no answer" in reason:
         return f"{reason}: in general it is a curve or a number that cannot be; look for it, or cut out a smaller area"
+    if "Cannot read file" in reason:
+        return f"{reason}: the map includes that file; put what is in it in the place of the <include>"
     return f"{reason}: correct this place of the map, or write it again with the tool that made it"
 
 

@@ -71,6 +71,7 @@ class Pilot:
         self._lane_number = {name: i for i, name in enumerate(network.lane_ids)}
         self._lengths_m, self._length_factors = network.lane_lengths_m(), drawn_length_factors(network)
         self._drawn_share = _drawn_share(network, self._length_factors)
+        self._counted_m, self._driven_m = 0.0, 0.0  # since the start, as SUMO counts and as drawn
         self._route: list[int] = []  # edges of the network
         self._leads_on = True  # the present lane leads to the route's next edge
         self._cap_mps, self._cap_offset_m = np.zeros(1), 0.0
@@ -153,7 +154,16 @@ class Pilot:
         if self._tour.duration_s is not None and len(self._log.lane) * SUMO_STEP_S > self._tour.duration_s:
             return True
         by_time_only = self._tour.length_m is None and self._tour.duration_s is not None
-        return not by_time_only and libsumo.vehicle.getDistance(EGO) * self._drawn_share >= self._tour.planned_length_m()
+        return not by_time_only and self._way_m() >= self._tour.planned_length_m()
+
+    def _way_m(self) -> float:
+        """What the ego has driven. Where SUMO counts other metres than are drawn, each lane's are turned into drawn ones."""
+        counted_m = float(libsumo.vehicle.getDistance(EGO))
+        if self._drawn_share == 1.0 or not self._log.lane:
+            return counted_m
+        self._driven_m += (counted_m - self._counted_m) * float(self._length_factors[self._log.lane[-1]])
+        self._counted_m = counted_m
+        return self._driven_m
 
     def _write_down(self, others: BackgroundTraffic) -> None:
         name = libsumo.vehicle.getLaneID(EGO)

@@ -6,6 +6,7 @@ import gc
 import hashlib
 import math
 import re
+import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import replace
@@ -28,12 +29,14 @@ from hippodrome.sim.net_notes import check_network
 from hippodrome.sim.network import road_network
 from hippodrome.sim.rural import rural_plan
 from hippodrome.sim.sumo_tools import check_that_sumo_reads, run_tool
-from hippodrome.sim.town_file import kept_town
+from hippodrome.sim.town_file import is_large, kept_town, write_town
+from hippodrome.sim.town_reader import ENCODING, REFUSED, read_apart
 from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.types import Town
 
 LANE_WIDTH_M: Final = 3.2  # SUMO's default
 POLE_SETBACK_M: Final = 0.8  # signal poles stand this far outside the carriageway
+READER: Final = "hippodrome.sim.town"  # this module, which reads a network if it is run
 MANY_LANES: Final = 5_000  # sumolib takes some 5 kB for each
 # A disc that holds what the ego sweeps when it turns round between two lanes of 3.2 m, as measured.
 TURNING_RADIUS_M: Final = 7.9
@@ -70,6 +73,8 @@ def build_town(spec: TownSpec, rng_seed: int, work_dir: Path) -> Town:
 
 def _that_sumo_reads(net_file: Path) -> Town:
     """A town from a network that somebody gives."""
+    if is_large(net_file):
+        return read_apart(net_file, READER, lambda: check_that_sumo_reads(net_file))
     town = read_town(net_file)
     check_that_sumo_reads(net_file)
     return town
@@ -261,3 +266,17 @@ def _beside_stop_line(lane: SumoNet, left_hand: bool) -> tuple[float, float, flo
     heading = math.atan2(y1 - y0, x1 - x0)
     aside = (0.5 * lane.getWidth() + POLE_SETBACK_M) * (1.0 if left_hand else -1.0)
     return x1 - aside * math.sin(heading), y1 + aside * math.cos(heading), heading
+
+
+def main(net_file: str, path: str) -> int:
+    """Read a network and write the town, for ``read_apart``; the exit status."""
+    try:
+        write_town(Path(path), read_town(Path(net_file)))
+    except HippodromeError as error:
+        sys.stdout.buffer.write(str(error).encode(*ENCODING))
+        return REFUSED
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -25,6 +25,7 @@ from hippodrome.sim.types import Town
 
 LARGE_BYTES: Final = 8_000_000  # of a network's file: some 200 km; what is smaller is read within a second or two
 LARGE_PACKED_BYTES: Final = 800_000  # the same, packed
+KEPT: Final = "kept"  # the folder of kept towns, which nobody else locks: the one it lies in may be held by the command itself
 CODE: Final = ("sim/**/*.py", "core/roads/*.py")  # that a town depends on
 OUTLINES: Final = ("junction_polygons_m", "other_lanes_m", "turning_places_m")  # parts of a town that are many arrays (n, 2)
 WORDS: Final = ("lane_ids", "edge_ids")  # parts of its network that are names
@@ -42,19 +43,20 @@ def kept_town(net_file: Path, folder: Path, read: Callable[[], Town]) -> Town:
 
     Args:
         net_file: The network.
-        folder: Where the town is kept, under a name that the network's bytes and our code give.
+        folder: Below it the town is kept, under a name that the network's bytes and our code give.
         read: Reads and checks the network.
     """
     if not is_large(net_file):
         return read()
+    folder = folder / KEPT
     recipe = sha256_of(net_file), net_file.name, code_sha256(PACKAGE, CODE), version("eclipse-sumo")
     path = folder / f"{net_file.name.partition('.')[0]}-{hashlib.sha256(repr(recipe).encode()).hexdigest()[:12]}.town.npz"
     folder.mkdir(parents=True, exist_ok=True)
     with _one_at_a_time(folder):
-        town = _from_file(path, net_file)
+        town = town_from_file(path, net_file)
         if town is None:
             town = read()
-            write_arrays(path, _arrays(town, path.name))
+            write_town(path, town)
     return town
 
 
@@ -68,6 +70,11 @@ def _one_at_a_time(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def write_town(path: Path, town: Town) -> None:
+    """A town on disk, whole or not at all."""
+    write_arrays(path, _arrays(town, path.name))
 
 
 def _arrays(town: Town, file_name: str) -> dict[str, Any]:
@@ -95,7 +102,7 @@ def _digest(arrays: dict[str, Any]) -> str:
     return digest.hexdigest()
 
 
-def _from_file(path: Path, net_file: Path) -> Town | None:
+def town_from_file(path: Path, net_file: Path) -> Town | None:
     """The town that was kept; None if there is none, or none that is whole."""
     joined = [name for part in OUTLINES for name in (part, f"{part}_ends")]
     wanted = ["words", "signals_m", *joined, *(f"network_{name}" for name in NUMBERS)]

@@ -14,6 +14,7 @@ import numpy as np
 
 from hippodrome.core.localization.beliefs.motion import PoseMeasurement
 from hippodrome.core.reading import LaneEnd, RoadReader, RoadReading
+from hippodrome.core.reading.borders import CONTRADICTS, FITS, fit_of_borders
 from hippodrome.core.roads.geometry import RoadGeometry, poses_on_segments, project
 from hippodrome.core.se2 import wrap_compiled
 from hippodrome.core.types import FloatArray, Frame, IntArray
@@ -32,8 +33,6 @@ LANE_SIGMA_M, LANE_SIGMA_RAD = 0.06, 0.015  # errors that readings of one street
 ACROSS = (0.0, 1.0, 0.0)  # what the place in the lane tells of (along, across, turned)
 OWN_M = 5.0  # lanes farther aside are not the vehicle's
 BESIDE_M = 0.3  # by which the nearest place of a lane lies ahead of or behind a vehicle that is beside it
-SURELY = 0.98  # largest probability with which a border is believed to be of a kind
-FITS, CONTRADICTS = -1.0, -2.0  # log likelihood of the borders of a lane that is the vehicle's, and of one that is not
 TIMES = 6  # that the borders must contradict the believed lane, one after the other, until it is another
 LOOK_M, LOOK_SIGMA_M = 8.0, 0.15  # ahead, where the place of the lane is compared, too: in bends it tells how far along
 END_APART_M = 1.0  # way between two readings of the end
@@ -116,7 +115,8 @@ class RoadSense:
         if len(rows) > 1:
             road = np.flatnonzero(beside & (np.abs(np.sin(off_rad)) < math.sin(SAME_WAY_RAD)))
             aside = np.cos(pose[2]) * -away[:, 1] - np.sin(pose[2]) * -away[:, 0]  # left of the vehicle
-            fits = np.array([_fit_of_borders(reading, aside[row], aside[road], network.width_m[near.lane[row]]) for row in rows])
+            edges, widths_m = (reading.left_edge, reading.right_edge), network.width_m[near.lane[rows]]
+            fits = np.array([fit_of_borders(*edges, aside[k], aside[road], w) for k, w in zip(rows, widths_m, strict=True)])
             chosen = self._told_apart(fits, best, near.lane[rows])
             if chosen is None:
                 return None
@@ -192,17 +192,6 @@ class RoadSense:
         told = np.linalg.inv(by.T @ (weight[:, None] * by) + np.diag([UNREAD_M**-2, UNREAD_M**-2, UNREAD_RAD**-2]))
         off = told @ by.T @ (weight * np.array([row[1] for row in kept]))
         return PoseMeasurement(pose + axes @ off, axes @ told @ axes.T)
-
-
-def _fit_of_borders(reading: RoadReading, aside_m: float, others_m: FloatArray, width_m: float) -> float:
-    """Log likelihood of the borders that were read, for a lane ``aside_m`` left of the vehicle among others (K,)."""
-    likelihood = 0.0
-    for side, edge in ((1.0, reading.left_edge), (-1.0, reading.right_edge)):
-        if math.isfinite(edge):
-            apart = side * (others_m - aside_m)
-            goes_on = bool(np.any((apart > 0.6 * width_m) & (apart < 1.6 * width_m)))
-            likelihood += math.log(min(max(1.0 - edge if goes_on else edge, 1.0 - SURELY), SURELY))
-    return likelihood
 
 
 def _agrees(row: tuple[tuple[float, float, float], float, float], believed: FloatArray) -> bool:

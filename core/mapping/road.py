@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from hippodrome.core.reading import RoadReader, RoadReading
-from hippodrome.core.types import Frame, LaneReadings, Observation
+from hippodrome.core.types import UNSEEN_PERCENT, Frame, LaneReadings, Observation
 from hippodrome.core.views.config import CameraGeometry
 from hippodrome.core.views.odometry import grey_image, seen_step
 
@@ -83,6 +83,7 @@ def lane_readings(readings: list[RoadReading]) -> LaneReadings:
     def column(name: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
         return np.array([getattr(reading, name) for reading in readings], dtype=np.float32)
 
+    edges = np.array([[reading.left_edge, reading.right_edge] for reading in readings], dtype=np.float64).reshape(-1, 2)
     return LaneReadings(
         offset_m=column("offset_m"),
         offset_variance_m2=column("offset_variance_m2"),
@@ -93,4 +94,5 @@ def lane_readings(readings: list[RoadReading]) -> LaneReadings:
         end_m=column("end_m"),
         end_variance_m2=column("end_variance_m2"),
         end=np.array([int(reading.end) for reading in readings], dtype=np.uint8),
+        edge_percent=np.where(np.isfinite(edges), np.rint(100.0 * np.nan_to_num(edges)), UNSEEN_PERCENT).astype(np.uint8),
     )

@@ -59,7 +59,9 @@ def unknown_lane_sigma_m(line: RouteLine, arc_m: FloatArray, lane_unknown: BoolA
     return sigma
 
 
-def choose_lanes(poses: FloatArray, matched: BoolArray, network: RoadNetwork, config: RouteSearchConfig) -> Route:
+def choose_lanes(
+    poses: FloatArray, matched: BoolArray, network: RoadNetwork, config: RouteSearchConfig, places: FloatArray | None = None
+) -> Route:
     """Search the route once more, along metric poses, whose lateral positions decide between parallel lanes.
 
     Args:
@@ -67,7 +69,9 @@ def choose_lanes(poses: FloatArray, matched: BoolArray, network: RoadNetwork, co
         matched: (S,) whether a pose also constrains the place of the route; the others contribute their motion only.
         network: the roads.
         config: states, bounds and costs of the search.
+        places: (S, 2) where something else than their lateral motion tells the lanes; None: the places of the poses.
     """
+    places = poses[:, :2] if places is None else places
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
     samples = np.arange(0.0, arc[-1] + 0.5 * config.step_m, config.step_m)
     track = Track(samples, np.interp(samples, arc, np.unwrap(poses[:, 2])), arc, config.step_m)
@@ -77,7 +81,7 @@ def choose_lanes(poses: FloatArray, matched: BoolArray, network: RoadNetwork, co
     costs = replace(config.costs, scale_step_nats=_SCALE_STEP_NATS)
     problem = SearchProblem(network, track, log_scale, graph, costs, config.off_network, config.bin_m)
     between_matched = np.interp(samples, arc, matched.astype(np.float64)) >= 1.0
-    places = [np.interp(samples, arc, poses[:, axis]) for axis in (0, 1)]
-    place_prior = np.column_stack([*places, between_matched / PLACE_SIGMA_M**2])
+    at_samples = [np.interp(samples, arc, places[:, axis]) for axis in (0, 1)]
+    place_prior = np.column_stack([*at_samples, between_matched / PLACE_SIGMA_M**2])
     start = StartPose(*(float(value) for value in poses[0]))
     return best_route(problem, starts_near_pose(problem, start, config), config, place_prior)

@@ -17,6 +17,7 @@ from hippodrome.core.matching.lane_choice import choose_lanes, near_lane_changes
 from hippodrome.core.matching.route_line import RouteLine, route_line
 from hippodrome.core.matching.search.problem import search_problem
 from hippodrome.core.matching.search.route import Route, most_likely_drive
+from hippodrome.core.refinement.borders import places_by_borders
 from hippodrome.core.refinement.config import RouteRefineConfig
 from hippodrome.core.refinement.edges import edges_where
 from hippodrome.core.refinement.residuals import GYRO
@@ -68,7 +69,9 @@ def solve_route(
     solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver, read)
     if np.any(free):
         drawn = np.column_stack([solution.state.drawn_points_m, solution.state.poses[:, 2]])
-        chosen = choose_lanes(drawn, vouched > 0.0, network, config.search)
+        edges = None if read is None or visits.lane is None else visits.lane.edge_percent
+        places = None if edges is None else places_by_borders(drawn, edges, network)[0]
+        chosen = choose_lanes(drawn, vouched > 0.0, network, config.search, places)
         line, arc = _line_and_places(chosen, network)
         log_scale, free = solution.state.log_scale, near_lane_changes(line, network)
         solution = refine_along_route(visits, closures, line, arc, log_scale, vouched, free, solver, read)

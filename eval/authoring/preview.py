@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from hippodrome.core.types import FloatArray, Frame, IntArray
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.figures.frames import draw_contact_sheet
 from hippodrome.eval.figures.preview import draw_preview
-from hippodrome.eval.pool import worker_pool
+from hippodrome.eval.pool import Workers, worker_pool
 from hippodrome.sim.episode import Samples, draw_frame
 from hippodrome.sim.network import edge_lengths_m
 from hippodrome.sim.record import ROLES, RecordingPlan, Role, simulate
@@ -55,32 +56,39 @@ def preview_scenario(scenario: Scenario, out: Path) -> Preview:
     """Simulate both drives, and draw ``overview.png`` and ``stills.png`` into ``out``. Raises HippodromeError."""
     require_gl()
     plans = {role: RecordingPlan(scenario, role, out) for role in ROLES}
-    town, results = _town_and_drives(scenario, list(plans.values()))
-    simulated = dict(zip(plans, results, strict=True))
-    drives = {role: drive for role, (drive, _) in simulated.items()}
-    samples = {role: sampled for role, (_, sampled) in simulated.items()}
+    with _workers(scenario) as pool:
+        town, results = _town_and_drives(scenario, list(plans.values()), pool)
+        simulated = dict(zip(plans, results, strict=True))
+        drives = {role: drive for role, (drive, _) in simulated.items()}
+        samples = {role: sampled for role, (_, sampled) in simulated.items()}
+        views = [(plan, town, drives[role], samples[role]) for role, plan in plans.items()]
+        drawn = [_stills(view) for view in views] if pool is None else pool.run("draw", _stills, views)
     mapping, second = drives["mapping"], drives["localization"]
     notes = network_notes(scenario, town)
     preview = Preview(town, drives, samples, notes, mapped_share(town.network, mapping, second))
     draw_preview(out / "overview.png", town.network, mapping.poses_m, visits_of_road(town.network, mapping.lane),
                  second.poses_m, f"{scenario.name}: the two drives")  # fmt: skip
-    frames, captions = _stills(plans, town, preview)
+    frames, captions = ([one for row in part for one in row] for part in zip(*drawn, strict=True))
     draw_contact_sheet(out / "stills.png", frames, captions, title=f"{scenario.name}: stills of the mapping and the second drive")
     return preview
 
 
-def _town_and_drives(scenario: Scenario, plans: list[RecordingPlan]) -> tuple[Town, list[tuple[Drive, Samples]]]:
-    """The town, and the drives. Those on somebody's network are simulated in processes of their own: SUMO crashes on some
-    networks. They load what they need while the town is read."""
-    network = scenario.town.network
-    if network is None:
+def _workers(scenario: Scenario) -> AbstractContextManager[Workers | None]:
+    """A process for each drive on somebody's network: SUMO crashes on some. Generated towns need none."""
+    return nullcontext() if scenario.town.network is None else worker_pool(len(ROLES))
+
+
+def _town_and_drives(
+    scenario: Scenario, plans: list[RecordingPlan], pool: Workers | None
+) -> tuple[Town, list[tuple[Drive, Samples]]]:
+    """The town, and the drives. The processes load what they need while the town is read."""
+    if pool is None:
         town = plans[0].town()
         return town, [simulate(plan, town) for plan in plans]
-    with worker_pool(len(plans)) as pool:
-        for _ in plans:
-            pool.executor.submit(_load)
-        town = plans[0].town()
-        return town, pool.run("simulate", _simulate, [(plan, town) for plan in plans], place=lambda _: str(network))
+    for _ in plans:
+        pool.executor.submit(_load)
+    town, network = plans[0].town(), str(scenario.town.network)
+    return town, pool.run("simulate", _simulate, [(plan, town) for plan in plans], place=lambda _: network)
 
 
 def _load() -> None:
@@ -106,22 +114,19 @@ def mapped_share(network: RoadNetwork, mapping: Drive, second: Drive) -> float:
     return float(lengths_m[np.intersect1d(known, wanted)].sum() / lengths_m[wanted].sum())
 
 
-def _stills(plans: dict[Role, RecordingPlan], town: Town, preview: Preview) -> tuple[list[Frame], list[str]]:
-    """``STILLS`` frames of each drive, spread evenly over it, and their captions."""
-    frames, captions = [], []
+def _stills(view: tuple[RecordingPlan, Town, Drive, Samples]) -> tuple[list[Frame], list[str]]:
+    """``STILLS`` frames of a drive, spread evenly over it, and their captions."""
     from hippodrome.sim.render.renderer import FrameRenderer  # after require_gl, which names what is missing
 
-    for role, plan in plans.items():
-        samples, conditions = preview.samples[role], plan.drive_spec.conditions
-        numbers = np.linspace(0, len(samples.frame_steps) - 1, 2 * STILLS + 1).astype(int)[1::2]  # not where a drive begins
-        views_m, camera = samples.poses_m[samples.frame_steps[numbers]], plan.scenario.camera
-        half_view_rad = float(np.radians(0.5 * camera.fov_deg + abs(camera.yaw_offset_deg)))
-        scene = build_scene(town, plan.scenario.seed, conditions, views_m, half_view_rad)  # of a large town only what they show
-        with FrameRenderer(scene, camera) as renderer:
-            for number in numbers:
-                frames.append(draw_frame(renderer, preview.drives[role], samples, int(number), conditions, plan.seed)[0])
-                captions.append(f"{role}, {samples.t_s[samples.frame_steps[number]]:.0f} s")
-    return frames, captions
+    plan, town, drive, samples = view
+    conditions, camera = plan.drive_spec.conditions, plan.scenario.camera
+    numbers = np.linspace(0, len(samples.frame_steps) - 1, 2 * STILLS + 1).astype(int)[1::2]  # not where a drive begins
+    views_m = samples.poses_m[samples.frame_steps[numbers]]
+    half_view_rad = float(np.radians(0.5 * camera.fov_deg + abs(camera.yaw_offset_deg)))
+    scene = build_scene(town, plan.scenario.seed, conditions, views_m, half_view_rad)  # of a large town only what they show
+    with FrameRenderer(scene, camera) as renderer:
+        frames = [draw_frame(renderer, drive, samples, number, conditions, plan.seed)[0] for number in numbers.tolist()]
+    return frames, [f"{plan.role}, {samples.t_s[samples.frame_steps[number]]:.0f} s" for number in numbers]
 
 
 def _town_line(town: Town) -> str:

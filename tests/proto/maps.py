@@ -63,8 +63,9 @@ def random_readings(rng, count):
     variance = lambda: np.where(seen, rng.uniform(0.01, 1.0, count), np.inf).astype(np.float32)  # noqa: E731
     pairs = [part for _ in range(2) for part in (value(), variance())]
     return LaneReadings(
-        *pairs, value(), value(), value(), variance(), np.where(seen, rng.integers(0, 3, count), 0).astype(np.uint8)
-    )
+        *pairs, value(), value(), value(), variance(), np.where(seen, rng.integers(0, 3, count), 0).astype(np.uint8),
+        np.where(seen[:, None], rng.integers(0, 101, (count, 2)), 255).astype(np.uint8),
+    )  # fmt: skip
 
 
 def assert_same(a, b):

@@ -226,6 +226,16 @@ def test_a_map_with_readings_is_read_by_programs_that_know_none(tmp_path):
     assert (version, stripped) == read_stream(tmp_path / "plain", FORMAT_VERSION)
 
 
+def test_readings_from_before_the_kinds_of_borders_were_kept_are_read(tmp_path):
+    read = random_map(read=True)
+    older = replace(read, visits=replace(read.visits, lane=replace(read.visits.lane, edge_percent=None)))
+    save_map(tmp_path / "older", older, PROVENANCE)
+    assert load_map(tmp_path / "older")[0].visits.lane.edge_percent is None
+    save_map(tmp_path / "newer", read, PROVENANCE)
+    loaded = load_map(tmp_path / "newer")[0].visits.lane
+    assert loaded.edge_percent.tobytes() == read.visits.lane.edge_percent.tobytes()
+
+
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
@@ -234,11 +244,12 @@ def test_a_map_with_readings_is_read_by_programs_that_know_none(tmp_path):
         ("heading_rad", np.inf, r"visits\.lane\.heading_rad\[1\] is not finite"),
         ("offset_m", 1e9, r"visits\.lane\.offset_m\[1\] is farther"),
         ("end", 3, r"visits\.lane\.end\[1\] is outside 0\.\.2"),
+        ("edge_percent", 101, r"visits\.lane\.edge_percent\[1, 0\] is outside 0\.\.100"),
     ],
 )
 def test_readings_of_no_camera_are_refused(tmp_path, field, value, message):
     read = random_map(read=True, visits=3)
-    lane = LaneReadings(*(np.ones(3, np.float32) for _ in range(8)), np.zeros(3, np.uint8))
+    lane = LaneReadings(*(np.ones(3, np.float32) for _ in range(8)), np.zeros(3, np.uint8), np.zeros((3, 2), np.uint8))
     wrong = getattr(lane, field).copy()
     wrong[1] = value
     broken = replace(read, visits=replace(read.visits, lane=replace(lane, **{field: wrong})))

@@ -254,6 +254,23 @@ def test_warnings_have_place_meaning_and_cure(tmp_path):
     assert len(notes) == 6 and notes[5].startswith("netconvert: 2 warnings of 2 more kinds")
 
 
+@pytest.mark.parametrize(("warning", "meaning"), [
+    ("Using default width for edge '2' as value 'x' could not be parsed", "the usual value was taken"),
+    ("Ignoring changeLeft prohibition for 'a_1' to avoid dead-end", "lanes may be changed there"),
+    ("Could not compute smooth shape for edge 'a'", "a bend is drawn with a corner"),
+])  # fmt: skip
+def test_nothing_is_called_left_out_that_is_there(tmp_path, warning, meaning):
+    (note,) = netconvert_notes([f"Warning: {warning}."], tmp_path / "none.net.xml")
+    assert meaning in note and "left out" not in note
+
+
+def test_a_map_that_includes_another_file_says_which_and_what_to_do(tmp_path):
+    source = tmp_path / "part.xodr"
+    source.write_text('<OpenDRIVE><header revMajor="1" revMinor="8"/><include file="other.xml"/></OpenDRIVE>')
+    with pytest.raises(HippodromeError, match=r"Cannot read file 'other\.xml'.*put what is in it in the place of the <include>"):
+        import_map(source, tmp_path / "made.net.xml.gz")
+
+
 def test_warnings_that_netconvert_only_counts_are_counted_with_their_kind(tmp_path):
     log = [*(f"Warning: Found angle of {a}.5 degrees at edge 'e{a}', segment 0." for a in (91, 92, 93)),
            "Warning: 25 total messages of type: Found angle of % degrees at edge '%', segment %."]  # fmt: skip

@@ -14,15 +14,15 @@ from hippodrome.sim.tour_spec import TourSpec
 from hippodrome.sim.town import build_town
 from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.traffic_spec import TrafficSpec
-from tests.sim import strange_networks, stranger_networks
+from tests.sim import strange_networks, stranger_networks, unlisted_maps, unlisted_networks
 
 BUILDERS = {
     name: build
-    for module in (strange_networks, stranger_networks)
+    for module in (strange_networks, stranger_networks, unlisted_networks, unlisted_maps)
     for name, build in inspect.getmembers(module, inspect.isfunction)
     if build.__module__ == module.__name__ and list(inspect.signature(build).parameters) == ["folder"]
 }
-DRIVEN = sorted(BUILDERS.keys() - {"converted", "osm", "never_green", "both_ways_on_one_side", "cliff"})
+DRIVEN = sorted(BUILDERS.keys() - {"converted", "osm", "never_green", "both_ways_on_one_side", "cliff", "banked_road"})
 
 
 @pytest.mark.parametrize("name", DRIVEN)
@@ -47,6 +47,13 @@ def test_what_is_drawn_follows_the_roads_and_not_the_distance_between_them(tmp_p
 def test_a_road_steeper_than_any_is_told(tmp_path):
     notes = " | ".join(build_town(TownSpec(network=stranger_networks.cliff(tmp_path)), 1, tmp_path).notes)
     assert "1 road(s) climb or fall by more than 50%, for instance AB by 200%" in notes
+
+
+def test_a_step_of_the_road_is_told_as_one_that_is_too_steep(tmp_path):
+    town = build_town(TownSpec(network=unlisted_maps.banked_road(tmp_path)), 1, tmp_path)
+    assert "2 road(s) climb or fall by more than 50%, for instance -1 by 500%" in " | ".join(town.notes)
+    drive = simulate_drive(town, TourSpec(length_m=250), TrafficSpec(vehicles=8), EgoSpec(), 1)
+    assert np.ptp(drive.heights_m) > 5.0
 
 
 def test_a_road_without_a_way_back_is_refused(tmp_path):

@@ -15,6 +15,7 @@ def test_a_map_keeps_a_reading_of_each_visit_and_is_the_same_otherwise():
     plain, read = (map_drive(observations, MapperConfig(road_reading=wanted)) for wanted in (False, True))
     assert plain.visits.lane is None
     assert len(read.visits.lane.offset_m) == len(read.visits.t_s)
+    assert read.visits.lane.edge_percent.shape == (len(read.visits.t_s), 2)
     for name in ("t_s", "poses", "view_cell"):
         assert getattr(plain, name).tobytes() == getattr(read, name).tobytes()
     assert plain.visits.motion.tobytes() == read.visits.motion.tobytes()

@@ -6,6 +6,7 @@ for the likeliest place whose way to the goal is driven without one: if that pla
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from hippodrome.core.navigation.belief import Belief
@@ -20,6 +21,7 @@ from hippodrome.core.types import FloatArray
 AGAIN_S: Final = 5.0  # later it is tried again to turn round where there was no room
 STANDING_MPS: Final = 0.1
 OBSTACLE_M: Final = 10.0  # who stands nearer than this before something waits for it
+QUEUE_M, QUEUE_SHARE = 40.0, 0.5  # what stands farther before a junction is hardly the end of a queue, and not waited for so long
 
 
 class Blockage:
@@ -41,11 +43,12 @@ class Blockage:
         self._escape, self._guide = escape, guide
         self._guess = -1  # the place without a fix for which a road was closed
         self.standing_s = 0.0
+        self._patience = 1.0  # share of the times that the vehicle waits
 
     @property
     def blocks(self) -> bool:
         """Whether the vehicle has stood before something for so long that it is taken to bar the way."""
-        return self.standing_s >= self._config.drive.blocked_s
+        return self.standing_s >= self._patience * self._config.drive.blocked_s
 
     def step(self, radar: Radar, barred: bool, dt_s: float) -> None:
         """Take a step in. ``barred`` says that somebody stands beyond the junction."""
@@ -53,6 +56,7 @@ class Blockage:
         waits = (barred or radar.gap_m < OBSTACLE_M) and radar.lamp not in (Lamp.RED, Lamp.YELLOW) and not radar.blind
         standing = self._senses.motion.speed_mps < STANDING_MPS
         self.standing_s = self.standing_s + dt_s if standing and waits else 0.0
+        self._patience = self._patient(radar)
         if not self.blocks:
             return
         plan, pose = self._way()
@@ -63,13 +67,22 @@ class Blockage:
             self.standing_s = 0.0
             self._planner.close(gate.edge)
             self._take_other_way(pose)
-        elif self.standing_s >= self._config.drive.turns_round_s and self._planner.close_own(pose):
+        elif self.standing_s >= self._patience * self._config.drive.turns_round_s and self._planner.close_own(pose):
             begins = self._escape.barred(radar.gap_m)
-            self.standing_s = 0.0 if begins else self._config.drive.blocked_s
+            self.standing_s = 0.0 if begins else self._patience * self._config.drive.blocked_s
             if begins:
                 self._remember_guess()
             else:
                 self._planner.open_all()
+
+    def _patient(self, radar: Radar) -> float:
+        """Less than 1 where the place is known, and what bars the way stands too far before the next junction to be a queue."""
+        track, plan = self._belief.track, self._belief.plan
+        gate = None if track is None or plan is None else plan.gate()
+        if gate is None or plan is None or not math.isfinite(radar.gap_m):
+            return 1.0
+        beyond_m = gate.entry_u_m - plan.u_m - self._config.vehicle.front_m - radar.gap_m
+        return QUEUE_SHARE if beyond_m > QUEUE_M else 1.0
 
     def _way(self) -> tuple[Plan | None, FloatArray | None]:
         """The way to the goal that is driven, and from where: with a fix, or from the likeliest place."""

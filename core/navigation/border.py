@@ -35,7 +35,9 @@ BEND_PER_STEP = 0.25
 def borders(part: UInt8Array) -> UInt8Array:
     """1 where cells (n, m) are what the car must not drive on: what is no road, and the painted lines at its edges.
 
-    A line is an edge's if it is thin and longer than any dash, or lies beside what is no road. Stop lines are thick.
+    A line is an edge's if it is thin and longer than any dash, or lies beside what is no road. Stop lines are thick. Ground that
+    was not seen is taken for what is nearest of all that was: behind a kerb there is no road, and round a corner, where one
+    sees past the kerb's end, the border is expected half-way between the kerb and the last line of sight.
     """
     other = cv2.morphologyEx((part == OTHER).astype(np.uint8), cv2.MORPH_OPEN, SPECK)
     paint = (part == PAINT).astype(np.uint8)
@@ -49,9 +51,15 @@ def borders(part: UInt8Array) -> UInt8Array:
         long[0] = False
         edge = np.maximum(edge, long[label].astype(np.uint8))
     found = cv2.morphologyEx(other | edge, cv2.MORPH_CLOSE, STRIPES)
-    near = (cv2.distanceTransform(1 - found, cv2.DIST_L2, 5) <= GAP_CELLS).astype(np.uint8)
-    closed = (cv2.distanceTransform(near, cv2.DIST_L2, 5) > GAP_CELLS) & (seen_ground(part) == 0)
-    return np.asarray(found | closed.astype(np.uint8), dtype=np.uint8)
+    seen = seen_ground(part)
+    to_found = cv2.distanceTransform(1 - found, cv2.DIST_L2, 5)
+    near = (to_found <= GAP_CELLS).astype(np.uint8)
+    closed = (cv2.distanceTransform(near, cv2.DIST_L2, 5) > GAP_CELLS) & (seen == 0)
+    rims = cv2.dilate(paint * (1 - found), BESIDE)  # of dashes and stop lines, which are brighter than road
+    free, barred = (part == ROAD) & (found == 0), ((part == OTHER) & (rims == 0)) | (found > 0)
+    to_free, to_barred = (cv2.distanceTransform(1 - kind.astype(np.uint8), cv2.DIST_L2, 5) for kind in (free, barred))
+    behind = (seen == 0) & (to_barred < to_free)
+    return np.asarray(found | closed.astype(np.uint8) | behind.astype(np.uint8), dtype=np.uint8)
 
 
 def room_fields(part: UInt8Array) -> tuple[FloatArray, FloatArray]:

@@ -19,6 +19,7 @@ INDICATED_RAD = math.radians(30.0)  # a way through a junction that turns more i
 SEARCH_BEHIND_M, SEARCH_AHEAD_M = 6.0, 10.0  # where the place on the path is looked for, about the last one
 STEERING_SHARE = 0.9  # of the rate at which the wheels turn: the rest is for corrections
 WHEELS_OVER_M = 1.0  # a step in a path's curvature is taken as one over this way, about where the wheels can be early and late
+NEAR_M = 1.5  # ways through a junction that come so near to one another cross or meet: lanes side by side are 3 m apart
 TURN_IN_M = 1.2  # before a bend the wheels begin to turn: with it most sharp corners are driven within the lanes
 
 
@@ -30,6 +31,7 @@ class Gate:
     exit_u_m: float  # where the next road begins
     edge: int  # the road after it, an index into ``edge_ids``; -1 if the path ends before
     indicator: Indicator
+    meets_others: bool = True  # False where one road merely goes on as another one: nobody has to be waited for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,9 +120,35 @@ def _gates(network: RoadNetwork, path: Path, lanes: IntArray, starts: FloatArray
         first, last = (min(int(starts[i] / STEP_M), len(path.heading_rad) - 1) for i in (k, end))
         turn_rad = float(path.heading_rad[min(last + 8, len(path.heading_rad) - 1)] - path.heading_rad[max(first - 8, 0)])
         edge = int(network.lane_edge[lanes[end]]) if end < len(lanes) else -1
-        gates.append(Gate(float(starts[k]), float(starts[end]), edge, indicated(turn_rad)))
+        after = int(lanes[end]) if end < len(lanes) else -1
+        meets = meets_others(network, int(lanes[k - 1]), lanes[k:end].tolist(), after)
+        gates.append(Gate(float(starts[k]), float(starts[end]), edge, indicated(turn_rad), meets))
         k = end
     return tuple(gates)
+
+
+def meets_others(network: RoadNetwork, before: int, inside: Sequence[int], after: int) -> bool:
+    """Whether others may cross or meet the way ``inside`` a junction between two lanes; ``after`` is -1 where it is unknown."""
+    if after < 0 or len(network.successors(before)) > 1 or np.count_nonzero(network.successor == after) > 1:
+        return True
+    own = np.concatenate([network.lane_points_m(lane) for lane in inside])
+    length_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(own, axis=0).T))])
+    along = np.arange(0.0, length_m[-1] + STEP_M, STEP_M)
+    way = np.column_stack([np.interp(along, length_m, own[:, axis]) for axis in (0, 1)])
+    others = np.setdiff1d(np.flatnonzero(network.is_internal), inside)
+    return any(_is_near(way, network.lane_points_m(int(lane))) for lane in others)
+
+
+def _is_near(way_m: FloatArray, line_m: FloatArray) -> bool:
+    """Whether points (n, 2) come near to a line (k, 2)."""
+    low, high = way_m.min(axis=0) - NEAR_M, way_m.max(axis=0) + NEAR_M
+    if (line_m.max(axis=0) < low).any() or (line_m.min(axis=0) > high).any():
+        return False
+    begin, step = line_m[:-1], np.diff(line_m, axis=0)
+    apart = way_m[:, None] - begin
+    share = np.einsum("nkj,kj->nk", apart, step) / np.maximum(np.einsum("kj,kj->k", step, step), 1e-9)
+    off = apart - np.clip(share, 0.0, 1.0)[..., None] * step
+    return bool((np.einsum("nkj,nkj->nk", off, off) < NEAR_M**2).any())
 
 
 def indicated(turn_rad: float) -> Indicator:
@@ -162,6 +190,11 @@ def offset_and_turn(course: Course, pose_m: FloatArray, u_m: float) -> tuple[flo
 def next_gate(course: Course, u_m: float) -> Gate | None:
     """The junction that the place ``u_m`` is before or in."""
     return next((gate for gate in course.gates if gate.exit_u_m > u_m), None)
+
+
+def next_mouth(course: Course, u_m: float) -> Gate | None:
+    """The same, of the junctions where others may have to be waited for: that is the one of which the radar tells."""
+    return next((gate for gate in course.gates if gate.exit_u_m > u_m and gate.meets_others), None)
 
 
 def path_poses(course: Course, from_u_m: float, to_u_m: float) -> FloatArray:

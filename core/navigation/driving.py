@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 from hippodrome.core.navigation.config import DriveConfig, VehicleShape
-from hippodrome.core.navigation.course import Course, Gate, at, next_gate
+from hippodrome.core.navigation.course import Course, Gate, at, next_gate, next_mouth
 from hippodrome.core.navigation.junctions import SIGHT_M, gate_speed_mps, is_barred, room_to_stop_m
 from hippodrome.core.navigation.speed import stopping_mps
-from hippodrome.core.navigation.types import Indicator, Radar
+from hippodrome.core.navigation.types import Indicator, Lamp, Radar
 
 LOOK_S = 0.6  # braking begins so early: the speed follows the wanted one with a lag of 1 / speed_gain, .67 s
-GOAL_BRAKING_MPS2 = 1.2  # gentle, since the last metre counts
+GOAL_BRAKING_MPS2 = 1.8  # gentler than elsewhere, since the last metre counts
 CHANGE_INDICATED_M = 25.0  # before a lane change
 BARRED = "waits: somebody stands beyond the junction"
 TURN_SIGMA_M = 0.6  # a turn is driven as ever where its place along the way is known so well: a corner forgives about twice that
@@ -56,12 +56,16 @@ def pace(
     gate = next_gate(course, u_m)
     indicator = Indicator.STRAIGHT
     if gate is not None and gate.entry_u_m < course.goal_u_m:
-        to_stop_m = gate.entry_u_m - vehicle.front_m - config.stop_before_m - u_m
-        if to_stop_m < SIGHT_M:
+        if gate.entry_u_m - vehicle.front_m - config.stop_before_m - u_m < SIGHT_M:
             indicator = gate.indicator
         unsure = turn_mps(gate, u_m, wanted, along_sigma_m)
         if unsure < wanted:
             wanted, reason = unsure, "slows down: the mouth is not known well"
+    gate = next_mouth(course, u_m) if radar.lamp is Lamp.NONE else gate  # there may be signals where nobody crosses
+    if gate is not None and gate.entry_u_m < course.goal_u_m:
+        to_stop_m = gate.entry_u_m - vehicle.front_m - config.stop_before_m - u_m
+        if to_stop_m < SIGHT_M and indicator is Indicator.STRAIGHT:
+            indicator = gate.indicator
         slowed, why = gate_speed_mps(to_stop_m, speed_mps, radar, config)
         if gate.indicator is Indicator.STRAIGHT and is_barred(to_stop_m, speed_mps, radar):
             slowed, why = stopping_mps(to_stop_m, config.braking_mps2), BARRED

@@ -16,20 +16,20 @@ import numpy as np
 
 from hippodrome.core import se2
 from hippodrome.core.navigation.agreement import WAY_STEP_M, LaneField, agreed_m, lane_field
-from hippodrome.core.navigation.border import OTHER, UNKNOWN
+from hippodrome.core.navigation.caution import leads_off_road, seems_road, turn_mps
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.course import Course, make_course, path_poses, place_on
 from hippodrome.core.navigation.driving import pace
 from hippodrome.core.navigation.junctions import gate_speed_mps
 from hippodrome.core.navigation.pilot import Plan, RoutePlanner, advanced, is_missed
 from hippodrome.core.navigation.places import Place
-from hippodrome.core.navigation.placing import lane_of
+from hippodrome.core.navigation.placing import keeps_left, lane_of
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2, stopping_mps
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
 from hippodrome.core.navigation.track import Track
 from hippodrome.core.navigation.types import Command, DrivingState, Radar
-from hippodrome.core.navigation.ways import drawn_on, moved, strip, way_poses, ways_ahead
+from hippodrome.core.navigation.ways import drawn_on, moved, way_poses, ways_ahead
 from hippodrome.core.navigation.whereabouts import Whereabouts
 from hippodrome.core.navigation.witnesses import Witnesses
 from hippodrome.core.reading.types import LaneEnd, RoadReading
@@ -43,7 +43,8 @@ LOOK_M: Final = 26.0  # of a way
 WAY_M: Final = 45.0  # of a way that is driven: another one is looked for before its end
 AGREED, GUESSED = 0.9, 0.6  # share of the poses that have a lane where the way is; with less, it is driven at a walk
 GUESS_FITS: Final = 0.85  # where the ground fits worse, even what all places agree on is a guess
-SEEN_M, SEEN, NOT_ROAD = (2.0, 8.0), 0.7, 0.05  # of a guess: so much must have been seen, and hardly any of it be no road
+SEEN_M, CAUTION_M = (2.0, 8.0), (1.0, 14.0)  # of a guess what must have been seen, and be road; where the road may bend away
+NEW_M, NEW_AFTER_M = 12.0, 3.0  # so much of it must be a way to be driven sooner after driving on sight: they come and go
 BEFORE_END_M: Final = 0.3  # the bumper stops so far before a stop line or a junction's mouth that is seen
 LEAST_M, SPARE_M = 5.0, 2.5  # of a way that is agreed on; and what is left over of it when the vehicle stops
 LIKELY: Final = 0.5  # share of a place from which the way to the goal is driven
@@ -51,8 +52,7 @@ RIVAL: Final = 0.25  # the place that is followed is given up where another has 
 PULL: Final = 0.5  # by which the pose is taken to the particles' mean each time
 TRY_EVERY_M: Final = 2.0  # trying ways costs milliseconds
 NEAR_GOAL_M: Final = 25.0  # whoever is not sure of the place does not stop at the goal
-AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of the way, which must not lead off the road
-OFF_ROAD, OFF_ROAD_LOOKS = 0.15, 2
+OFF_ROAD_LOOKS: Final = 2  # that say that the way leads off the road
 FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 30.0  # a place so sure over so much way is a fix
 SAME_PLACE_M, GUIDED_MPS, GUESSED_MPS = 12.0, 6.0, 2.0  # hypotheses so near to the goal are of one place
 REASON, GUESS = "drives where all likely places have a lane", "creeps where most likely places have a lane"
@@ -79,6 +79,9 @@ class Guide:
         self._off_road, self._is_off_road = 0, False
         self._turned_round = self._sees_road = False
         self._end_m = math.inf  # to the end of the lane that was seen last
+        self._most_mps = math.inf  # where the road may bend away
+        self._side = 1.0 if keeps_left(planner.roads) else -1.0
+        self._on_sight_m = 0.0  # since a way was driven last
         self.places_given_up = 0  # that were followed
 
     @property
@@ -139,15 +142,17 @@ class Guide:
         self._check_footing(senses.footing.is_off_road)
         self._see_end(senses.reading, distance_m)
         self._since_look_m, self._since_try_m = self._since_look_m + abs(distance_m), self._since_try_m + abs(distance_m)
+        ahead = self._ahead(*CAUTION_M)
+        self._most_mps = math.inf if ahead is None else turn_mps(senses.ground, ahead, self._side)
+        self._on_sight_m += abs(distance_m) if self._on_sight_m > 0.0 else 0.0
         if self._since_look_m >= 1.0:
             self._look(senses, held is None)
             self._since_look_m = 0.0
         if held is not None:
             self.plan = self.pose = None
         elif self.plan is not None and self.pose is not None:
-            self.plan = advanced(self.plan, self.pose)
-            if is_missed(self.plan, self.pose):
-                self.plan = None
+            plan = advanced(self.plan, self.pose)
+            self.plan = None if is_missed(plan, self.pose) else plan
 
     def _look(self, senses: Senses, searches: bool) -> None:
         """Look for the likeliest place, and for what can be driven from there."""
@@ -167,7 +172,8 @@ class Guide:
         if (self.agreed_m < LEAST_M or ends or wants_goal) and self._since_try_m >= TRY_EVERY_M:
             self._since_try_m = 0.0
             self._try(best, poses, senses)
-        self._sees_road = self._is_seen(senses)
+        ahead = self._ahead(*SEEN_M)
+        self._sees_road = ahead is not None and seems_road(senses.ground, ahead)
 
     def _see_end(self, reading: RoadReading | None, distance_m: float) -> None:
         """Remember the end of the lane that was seen."""
@@ -177,13 +183,11 @@ class Guide:
         elif self._end_m < 0.0:
             self._end_m = math.inf
 
-    def _is_seen(self, senses: Senses) -> bool:
-        """Whether the way right ahead has been seen, and to be road."""
+    def _ahead(self, from_m: float, to_m: float) -> FloatArray | None:
+        """The way ahead (n, 3), in the vehicle's axes."""
         if self.plan is None or self.pose is None:
-            return False
-        path = path_poses(self.plan.course, self.plan.u_m + SEEN_M[0], self.plan.u_m + SEEN_M[1])
-        kinds = senses.ground.kinds_at(strip(se2.between(self.pose, path), HALF_BODY_M))
-        return bool(np.mean(kinds != UNKNOWN) > SEEN and np.mean(kinds == OTHER) < NOT_ROAD)
+            return None
+        return se2.between(self.pose, path_poses(self.plan.course, self.plan.u_m + from_m, self.plan.u_m + to_m))
 
     def _follow(self, best: Place) -> None:
         """Take the pose to the particles about it, or give it up for a place that is much likelier."""
@@ -200,20 +204,12 @@ class Guide:
 
     def _keep(self, senses: Senses, poses: FloatArray) -> None:
         """See how far the present way is agreed on; give it up where it leads off the road."""
-        assert self.plan is not None and self.pose is not None
-        course = self.plan.course
-        ahead = se2.between(self.pose, path_poses(course, self.plan.u_m, self.plan.u_m + LOOK_M)[::4])
-        self.agreed_m, self.guessed_m = self._reach_m(self._field.agreed(ahead[None], poses)[0])
-        self._off_road = self._off_road + 1 if self._leads_off_road(senses, ahead) else 0
+        ahead = self._ahead(0.0, LOOK_M)
+        assert ahead is not None
+        self.agreed_m, self.guessed_m = self._reach_m(self._field.agreed(ahead[::4].copy()[None], poses)[0])
+        self._off_road = self._off_road + 1 if leads_off_road(senses.ground, ahead[::4]) else 0
         if self._off_road >= OFF_ROAD_LOOKS:
             self.plan, self.agreed_m, self.guessed_m, self._off_road = None, 0.0, 0.0, 0
-
-    def _leads_off_road(self, senses: Senses, ahead: FloatArray) -> bool:
-        """Whether a way (n, 3), in the vehicle's axes, is seen to lead where there is no road."""
-        near = ahead[(ahead[:, 0] > AHEAD_M[0]) & (np.hypot(ahead[:, 0], ahead[:, 1]) < AHEAD_M[1])]
-        if len(near) == 0:
-            return False
-        return senses.ground.off_road_share(strip(near, HALF_BODY_M)) > OFF_ROAD
 
     def _try(self, best: Place, poses: FloatArray, senses: Senses) -> None:
         """Look for a way that is agreed on for longer than the present one."""
@@ -232,7 +228,7 @@ class Guide:
                     continue
                 way = way_poses(network, pieces, grid_m, place.position_m)
                 ahead = se2.between(pose, way)
-                if len(way) > 1 and not self._leads_off_road(senses, ahead):
+                if len(way) > 1 and not leads_off_road(senses.ground, ahead):
                     found.append((pose, pieces, ahead, place.position_m))
         if not found:
             return
@@ -260,7 +256,7 @@ class Guide:
             return False
         ahead = se2.between(best.pose, path_poses(plan.course, plan.u_m, plan.u_m + LOOK_M)[::4])
         far_m = self._reach_m(self._field.agreed(ahead[None], poses)[0])
-        if far_m[0] < LEAST_M or self._leads_off_road(senses, ahead):
+        if far_m[0] < LEAST_M or leads_off_road(senses.ground, ahead):
             return False
         self.plan, self.pose, self._to_goal, (self.agreed_m, self.guessed_m) = plan, best.pose, True, far_m
         return True
@@ -281,13 +277,16 @@ class Guide:
         if left_m < LEAST_M - 1.0 or self.whereabouts.fits < GUESS_FITS:
             left_m = max(left_m, self.guessed_m - self._since_look_m) if self._sees_road else 0.0
             most_mps, reason = GUESSED_MPS, GUESS
-        if self.plan is None or self.pose is None or left_m < LEAST_M - 1.0:
+        is_new = 0.0 < self._on_sight_m < NEW_AFTER_M and left_m < NEW_M
+        if self.plan is None or self.pose is None or left_m < LEAST_M - 1.0 or is_new:
+            self._on_sight_m = max(self._on_sight_m, 0.01)
             return None
+        self._on_sight_m = 0.0
         step = pace(self.plan.course, self.plan.u_m, speed_mps, radar, 0.0, config.drive, config.vehicle)
         agreed_mps = max(stopping_mps(left_m - SPARE_M, config.drive.braking_mps2), config.drive.creep_mps)
         seen_m = self._end_m - config.vehicle.front_m - BEFORE_END_M
         seen_mps, why = gate_speed_mps(seen_m, speed_mps, radar, config.drive)
-        wanted = min(step.speed_mps, most_mps, agreed_mps, seen_mps)
+        wanted = min(step.speed_mps, most_mps, agreed_mps, seen_mps, self._most_mps)
         if wanted < min(most_mps, agreed_mps):
             reason = (why if seen_mps <= step.speed_mps else step.reason) or reason
         accel = min(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 import numpy as np
@@ -31,7 +31,10 @@ STANDS_MPS: Final = 0.05
 THERE_M: Final = 0.06  # a leg is driven to within this
 WHEELS_RAD: Final = 0.03  # of the angle that they are to have
 KEPT_M: Final = 0.8  # from whom the radar sees ahead or behind
-HELD_UP_S: Final = 6.0  # so long before somebody, a leg ends where it is
+HELD_UP_S: Final = 3.0  # so long before somebody, a leg ends where it is
+COMES_MPS, COMES_S, COMES_SHARE = 1.5, 3.5, 0.3  # who comes nearer so fast, and would be here so soon, is let pass; smoothed
+JUMP_MPS: Final = 20.0  # a distance that changes faster is somebody else's
+LETS_PASS_S: Final = 8.0  # .. for so long at each leg: those who come now see a vehicle that stands askew
 CALM_M: Final = 25.0  # nobody who moves is nearer ..
 LEAST_CALM_M: Final = 10.0  # on a busy street one goes at last when there is so much, ..
 IMPATIENT_MPS: Final = 0.5  # .. for what is wanted shrinks as one waits
@@ -88,10 +91,12 @@ class Turn:
         self._indicator = Indicator.LEFT if sum(leg.turned_rad for leg in legs) > 0.0 else Indicator.RIGHT
         self._driven_m = self._turned_rad = self._calm_s = self._held_up_s = 0.0
         self._begun, self._count, self._waited_s = False, 0, 0.0
+        self._moving_m, self._closing_mps, self._let_pass_s = math.inf, 0.0, 0.0
 
     def step(self, now: Sensed) -> Command | None:
         """The next command; None once the vehicle has turned round, or has failed to."""
         motion, radar, dt_s = now.motion, now.radar, now.dt_s
+        self._see(radar, dt_s)
         if not self._begun:
             self._waited_s += dt_s
             calm_m = max(CALM_M - IMPATIENT_MPS * self._waited_s, LEAST_CALM_M)
@@ -110,9 +115,25 @@ class Turn:
             return self._next(motion, backs)
         if stands and abs(motion.steering_rad - wheel) > WHEELS_RAD:
             return self._standing(wheel, backs, "turns round")
+        if self._comes and self._let_pass_s < LETS_PASS_S:
+            self._let_pass_s += dt_s
+            stopped = self._standing(wheel, backs, "lets somebody pass, to turn round")
+            return stopped if stands else replace(stopped, acceleration_mps2=FIRM_MPS2)
         gap_m = radar.gap_behind_m if backs else radar.gap_m
         self._held_up_s = self._held_up_s + dt_s if stands and gap_m < 2.0 * KEPT_M else 0.0
         return self._command(pedal_mps2(abs(motion.speed_mps), min(rest_m, gap_m - KEPT_M)), wheel, backs)
+
+    def _see(self, radar: Radar, dt_s: float) -> None:
+        """Note how fast the nearest of those who move comes nearer."""
+        seen = math.isfinite(self._moving_m) and math.isfinite(radar.moving_m)
+        rate = (self._moving_m - radar.moving_m) / dt_s if seen else math.inf
+        self._closing_mps = self._closing_mps + COMES_SHARE * (rate - self._closing_mps) if abs(rate) < JUMP_MPS else 0.0
+        self._moving_m = radar.moving_m
+
+    @property
+    def _comes(self) -> bool:
+        """Whether somebody will be here soon, who may not see that the vehicle is about to go across the road."""
+        return self._closing_mps > COMES_MPS and self._moving_m < COMES_S * self._closing_mps
 
     def _rest_m(self, leg: Leg) -> float:
         """What is left of a leg."""
@@ -125,7 +146,7 @@ class Turn:
         rest, gear = self._legs[1:], 1 if backs else -1
         self._count += 1
         cut, straight = self._cut, self._legs[0].curvature_1pm == 0.0
-        self._driven_m = self._turned_rad = self._held_up_s = 0.0
+        self._driven_m = self._turned_rad = self._held_up_s = self._let_pass_s = 0.0
         self._cut = False
         if not rest and not cut:
             return None

@@ -18,6 +18,7 @@ from typing import Protocol
 
 from hippodrome.core.localization.localizer import Localizer
 from hippodrome.core.navigation import motion as motions
+from hippodrome.core.navigation.arrival import LOOKS, Arrival
 from hippodrome.core.navigation.belief import Belief
 from hippodrome.core.navigation.blockage import STANDING_MPS, Blockage
 from hippodrome.core.navigation.config import NavigatorConfig
@@ -49,7 +50,6 @@ NO_ROOM = "no way leads on, and there is no room to turn round"
 HOLD_MPS2 = -1.0  # what holds a vehicle that stands
 ROUND_M = 250.0  # searched round one block, then straight on to the next ones, and so in turn
 FOUND_AGAIN_M = 20.0  # driven before the localizer found the place again: it has yet to find the scale, and is heard anew
-ROUND_AGAIN_S = 3.0  # stood at a goal that cannot be vouched for, before going round
 
 
 class PoseSource(Protocol):
@@ -92,17 +92,17 @@ class Navigator:
         self._escape = Escape(config, self._senses, self._belief, self._planner, self._side)
         self._guide = Guide(config, self._planner) if config.search_network and poses is None else None
         self._blockage = Blockage(config, self._senses, self._belief, self._planner, self._escape, self._guide)
+        self._arrival = Arrival(config, self._belief, self._planner, self._escape, self._guide)
         self._streets = None if config.exact_poses else StreetMemory(config.localizer.views)
         self._health = SensorHealth()
         self._has_goal = False
-        self._at_goal_s = self._search_stood_s = self._searched_m = self._unknown_m = 0.0
-        self._arrived = False
+        self._search_stood_s = self._searched_m = self._unknown_m = 0.0
         self.estimate: LocalizationEstimate | None = None  # the localizer's last answer, for who looks on
 
     def set_goal(self, goal: Goal) -> None:
         """Drive to ``goal`` from now on. Raises HippodromeError if it lies on no lane of its direction."""
         self._planner.set_goal(goal)
-        self._has_goal, self._arrived, self._belief.plan = True, False, None
+        self._has_goal, self._arrival.arrived, self._belief.plan = True, False, None
 
     @property
     def track(self) -> Track | None:
@@ -176,7 +176,7 @@ class Navigator:
         halt, complaint = self._health.complaint(self._config.watch)
         if not self._has_goal:
             return self._standing(DrivingState.HALTED, "has no goal")
-        if self._arrived:
+        if self._arrival.arrived:
             return self._standing(DrivingState.ARRIVED, "has arrived")
         command = self._escape.step(radar, dt_s)
         if command is None and self._senses.footing.is_off_road:
@@ -261,8 +261,13 @@ class Navigator:
             state = DrivingState.DOUBTING
             if config.drive.doubt_mps < wanted:
                 wanted, reason = config.drive.doubt_mps, "doubts its place"
+        if self._arrival.looks(plan):
+            look_mps = self._arrival.look_mps(plan, speed, radar)
+            if look_mps is None:
+                return self._standing(DrivingState.DRIVING, LOOKS)
+            wanted, reason = (look_mps, LOOKS) if look_mps < wanted else (wanted, reason)
         if plan.to_goal_m < config.drive.goal_tolerance_m and speed < STANDING_MPS:
-            return self._to_turn() if plan.turns else self._at_goal(dt_s)
+            return self._to_turn() if plan.turns else self._standing(*self._arrival.at_goal(dt_s))
         accel = min(approach_mps2(speed, wanted, config.drive), following_mps2(speed, radar, config.drive, config.vehicle))
         accel = min(accel, stop_mps2(speed, step.to_stop_m, config.drive, config.vehicle))
         if wanted <= 0.0 and speed < STANDING_MPS:
@@ -276,21 +281,6 @@ class Navigator:
         begins = self._escape.barred(math.inf)
         state, reason = (DrivingState.DRIVING, "turns round") if begins else (DrivingState.HALTED, NO_ROOM)
         return self._standing(state, reason)
-
-    def _at_goal(self, dt_s: float) -> Command:
-        """Stands at the goal: says so if the place is known well, and else goes round once more."""
-        assert self._belief.track is not None and self.estimate is not None
-        drive = self._config.drive
-        self._at_goal_s += dt_s
-        track, sigma_m = self._belief.track, drive.goal_sigma_m
-        is_known = track.along_sigma_m < sigma_m and self._belief.since_fix_m > drive.settled_m
-        if is_known and (self._guide is None or self._guide.vouches(track, self._belief.witnesses, sigma_m)):
-            self._arrived = True
-            return self._standing(DrivingState.ARRIVED, "has arrived")
-        if self._at_goal_s > ROUND_AGAIN_S:
-            self._at_goal_s = 0.0
-            self._belief.plan = self._planner.plan(self._belief.track.pose, 0.0, beyond_goal=True)
-        return self._standing(DrivingState.DOUBTING, "cannot vouch for the goal's place")
 
     def _standing(self, state: DrivingState, reason: str) -> Command:
         """Stop, and stand."""

@@ -29,12 +29,14 @@ FRESH_M = 2.5  # a lane that was read is steered by for so long
 FORGOTTEN_M = 8.0  # after so long without a reading, any reading is believed
 JUMP_M = 0.6  # readings that differ by more are of different lanes
 STRAIGHT_M, AGREES_RAD = 6.0, 0.15  # the lane that was read is steered by where the way turns as it does, so far ahead
+SWING_M, SHARP_1PM = 9.0, 0.2  # so far before a sharp bend the way swings out, and is no longer the lane's middle
 CREEP_GAP_M = 4.0
 STOP_SHORT_M = 0.8  # of the end of the way that can be driven
 ROOM_M, LEAST_ROOM_M = 0.95, 0.3  # of the car's middle line on either side: its wheels reach .8 m
 PATIENT_S, ROOM_LESS_MPS = 3.0, 0.1  # who stands longer without a way takes less room, rather than stand for ever
 STOOD_S, STANDS_MPS, TURNED_RAD = 0.5, 0.3, 0.1  # who has stood so long turns the wheels before going on
 WHEEL_RATE_RADPS = 0.6  # at which a way's curvature is followed; the wheels can do .9
+LAG_S = 0.6  # with which the speed follows the wanted one: 1 / speed_gain
 SEARCH_LATERAL = 0.6  # of the lateral acceleration: corners that nobody knows are taken slowly
 BLIND_M = 5.0  # the way is driven so far without a border beside it, at walking pace
 SURE_M2 = 0.03  # variance of an offset in the lane that is steered by
@@ -118,16 +120,17 @@ def search_step(
     bends, turned = way.curvature_1pm, way.heading_rad - way.heading_rad[0]
     near = min(int(PREVIEW_S * speed_mps / STEP_M), len(bends) - 1)
     curvature = float(bends[near])
-    in_lane = memory.is_fresh and _agrees(memory, turned[: int(STRAIGHT_M / STEP_M)])
+    is_sharp = float(np.max(np.abs(bends[: int(SWING_M / STEP_M)]))) > SHARP_1PM
+    in_lane = memory.is_fresh and not is_sharp and _agrees(memory, turned[: int(STRAIGHT_M / STEP_M)])
     if in_lane:
         bend, offset_m, heading = memory.curvature_1pm, memory.offset_m, memory.heading_rad
         curvature = lane_curvature_1pm(bend, offset_m, heading, speed_mps, config)
     wanted, reason = config.search_mps, "looks for known ground"
     first_m = STRAIGHT_M if in_lane else 0.0  # up to there the lane is driven, and not the border
     ahead = np.abs(bends[min(int(first_m / STEP_M), len(bends) - 1) :])
-    braking = 2.0 * config.braking_mps2 * (first_m + STEP_M * np.arange(len(ahead)))
+    braking = _braking(config, speed_mps, first_m, len(ahead))
     wanted = min(wanted, float(np.min(np.sqrt(SEARCH_LATERAL * config.lateral_mps2 / np.maximum(ahead, 1e-3) + braking))))
-    wanted = min(wanted, _wheels_mps(bends, bend_1pm, config, vehicle))
+    wanted = min(wanted, _wheels_mps(bends, bend_1pm, speed_mps, config, vehicle))
     if way.seen_m < LOOK_M:
         wanted = min(wanted, max(stopping_mps(way.seen_m, config.braking_mps2), config.creep_mps))
     if way.free_m < LOOK_M:
@@ -153,12 +156,20 @@ def _agrees(memory: LaneMemory, turned_rad: FloatArray) -> bool:
     return bool(np.max(np.abs(turned_rad - lane_rad)) < AGREES_RAD)
 
 
-def _wheels_mps(bends_1pm: FloatArray, bend_1pm: float, config: DriveConfig, vehicle: VehicleShape) -> float:
+def _braking(config: DriveConfig, speed_mps: float, first_m: float, count: int) -> FloatArray:
+    """By how much (n,) the square of the speed [m^2/s^2] can fall over ``STEP_M`` after ``STEP_M``; it is followed with a lag."""
+    ahead_m = first_m + STEP_M * np.arange(count, dtype=np.float64)
+    falls: FloatArray = 2.0 * config.braking_mps2 * np.maximum(ahead_m - LAG_S * speed_mps, 0.0)
+    return falls
+
+
+def _wheels_mps(bends_1pm: FloatArray, bend_1pm: float, speed_mps: float, config: DriveConfig, vehicle: VehicleShape) -> float:
     """The highest speed now at which the wheels can be turned as the way wants, braking in time before where they turn fast."""
     angle = np.arctan(vehicle.wheelbase_m * np.concatenate([[bend_1pm], bends_1pm]))
     rate = np.abs(angle[SPAN:] - angle[:-SPAN]) / (SPAN * STEP_M)
     most = np.maximum(WHEEL_RATE_RADPS / np.maximum(rate, 1e-3), config.creep_mps)
-    return float(np.min(np.sqrt(most**2 + 2.0 * config.braking_mps2 * STEP_M * np.arange(len(rate))), initial=config.search_mps))
+    falls = _braking(config, speed_mps, 0.0, len(rate))
+    return float(np.min(np.sqrt(most**2 + falls), initial=config.search_mps))
 
 
 def _to_stop_m(turned_rad: np.ndarray, reading: RoadReading | None, vehicle: VehicleShape) -> float:

@@ -29,6 +29,7 @@ from hippodrome.core.navigation.border import (
     room_fields,
     seen_ground,
 )
+from hippodrome.core.navigation.rounding import bends_of, rounded
 from hippodrome.core.navigation.sweep import drivable
 from hippodrome.core.types import FloatArray, Frame, UInt8Array
 from hippodrome.core.views.config import CameraGeometry
@@ -179,16 +180,19 @@ class Ground:
         seen = seen_ground(part)
         field, room = room_fields(part)
         line = along_border(field, corner_m, self.pose, bend_1pm, side, beside_m, straight_on, int(length_m / STEP_M))
+        plain = np.ascontiguousarray(line[:, :3])
+        led = rounded(plain, bend_1pm, side, room, corner_m, CELL_M)
         bends = sorted(STANDING_BENDS_1PM, key=lambda one: abs(one - bend_1pm)) if stands else [bend_1pm]
-        tried = [
-            drivable(room, seen, corner_m, CELL_M, self.pose, one, np.ascontiguousarray(line[:, :3]), need_m) for one in bends
-        ]
+        tried = [drivable(room, seen, corner_m, CELL_M, self.pose, one, led, need_m, side) for one in bends]
         rows = max(tried, key=len)
         free_m = sweep.STEP_M * len(rows) if len(rows) < sweep.STEPS else math.inf
         unseen = np.flatnonzero(rows[:, 3] > 0.0)
         seen_m = sweep.STEP_M * float(unseen[0]) if len(unseen) else math.inf
         fine = rows if len(rows) else np.array([[bend_1pm, self.pose[2], 0.0, 0.0]])
         fine = np.repeat(fine, int(sweep.STEP_M / STEP_M), axis=0)
+        if led is not plain and not stands:  # a bend that keeps clear is driven as it is: the way found beside it begins late
+            bent = bends_of(led, room, corner_m, CELL_M, need_m, len(fine))
+            fine[: len(bent), :2] = bent
         return Way(fine[:, 0], fine[:, 1], line[:, 3], free_m, seen_m)
 
     def around(self, reach_m: float) -> tuple[UInt8Array, FloatArray]:

@@ -20,10 +20,11 @@ UNIT_1PM = 0.02  # of curvature
 MOST_UNITS = 16  # a little less than the turning circle
 CHANGES = np.array([0, -1, 1, -3, 3, -7, 7])  # of curvature in a step; a car at walking pace turns its wheels so fast
 COMFORT_M = 1.25  # from the car's middle line to a border; nearer costs
-ROOM_WEIGHT, HEADING_WEIGHT, CHANGE_WEIGHT, UNSEEN_COST = 6.0, 1.5, 8.0, 0.8
+ROOM_WEIGHT, HEADING_WEIGHT, CHANGE_WEIGHT, UNSEEN_COST = 6.0, 1.5, 8.0, 0.2
 BODY_M = np.array([0.0, 1.35, 2.7, 3.4])  # points of the middle line that are kept clear, ahead of the rear axle ..
 BODY_LESS_M = np.array([0.0, 0.0, 0.0, 0.35])  # .. and how much nearer to a border they may be: the bumper is rounded
 WHEELS_M = np.array([[0.0, -0.9], [0.0, 0.9], [2.7, -0.9], [2.7, 0.9]])  # where the ground should have been seen
+OUTWARD_WEIGHT = 3.0  # what is off the line on the side of the oncoming lane counts more
 SLOTS = 4096  # for places that are taken
 REACH = 7  # samples of the line, within which it is followed in one step
 
@@ -61,7 +62,7 @@ def _is_unseen(cells: UInt8Array, corner: FloatArray, cell_m: float, x: float, y
 @njit(cache=True)
 def drivable(
     field: FloatArray, cells: UInt8Array, corner: FloatArray, cell_m: float, pose: FloatArray, bend: float, line: FloatArray,
-    need_m: float,
+    need_m: float, side: float = 0.0,
 ) -> FloatArray:  # fmt: skip
     """The way from a pose, as rows (n, 4) of curvature, heading, room and whether the ground is unseen, one per ``STEP_M``.
 
@@ -72,6 +73,7 @@ def drivable(
         bend: curvature at which the wheels stand.
         line: (n, 3) places and headings of the line to keep to.
         need_m: room that the car must have; where it has less now, it may not get less.
+        side: of the border that the line keeps to: -1 right, +1 left. Away from it lies the oncoming lane; 0 for neither.
 
     Returns:
         Fewer than ``STEPS`` rows where there is no way on.
@@ -115,6 +117,9 @@ def drivable(
                     wx = nx + ahead * math.cos(nh) - aside * math.sin(nh)
                     wy = ny + ahead * math.sin(nh) + aside * math.cos(nh)
                     dark += 1.0 if _is_unseen(cells, corner, cell_m, wx, wy) else 0.0
+                outward = math.cos(line[at, 2]) * (ny - line[at, 1]) - math.sin(line[at, 2]) * (nx - line[at, 0])
+                if outward * side < 0.0:
+                    off *= OUTWARD_WEIGHT
                 near = max(COMFORT_M - room, 0.0)
                 price = cost[last, b] + off + HEADING_WEIGHT * askew**2 + ROOM_WEIGHT * near**2
                 price += CHANGE_WEIGHT * (CHANGES[c] * UNIT_1PM) ** 2 + UNSEEN_COST * dark

@@ -111,7 +111,8 @@ def heard(
     )
     if told is not None:
         agrees = _agrees(track.pose, told)
-        views = now.views + far_m * (VIEW_PER_M if agrees else -AGAINST_PER_M)
+        new_m = max(distance_m, 0.0)  # whoever backs has seen the same before
+        views = now.views + new_m * (VIEW_PER_M if agrees else -AGAINST_PER_M)
         now = replace(now, views=min(max(views, -MOST_VIEWS), MOST_VIEWS))
         now = measured(now, VIEW_M, float(track.pose[2])) if agrees else now
     if not math.isnan(end_off_m):

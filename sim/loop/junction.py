@@ -16,12 +16,15 @@ from hippodrome.sim.loop.users import Users
 
 SIGHT_M: Final = 90.0  # so far from its junction a vehicle is seen coming: nine seconds at 10 m/s
 LINKS_AHEAD: Final = 3  # junctions that a vehicle is followed through: short streets between split junctions
+LANES_INSIDE: Final = 4  # in a row, in a junction: netconvert makes up to three, and the road is one more
 PATIENCE_S: Final = 5.0  # whoever stands so long at the junction, though he might go, waits for somebody else
 MARGIN_S: Final = 1.0  # between the ego's rear and the next vehicle
 FOE_ACCEL_MPS2: Final = 1.0  # others may become this much faster on their way
 OWN_ACCEL_MPS2: Final = 1.5  # with which the ego is taken to drive through
+OWN_BRAKING_MPS2: Final = 2.0  # and to brake before a bend
 STRAIGHT_MPS, BEND_MPS = 8.0, 4.5  # and the speeds at which it is taken to do so
 BEND_RAD: Final = math.radians(35.0)
+TURN_RADPS: Final = 0.5  # through sharp corners a car creeps: its wheels have to be turned meanwhile
 STANDS_MPS: Final = 0.3
 
 
@@ -38,6 +41,7 @@ class Comer:
         speed_mps: now.
         held: a red or yellow signal keeps it out.
         waiting_s: so long it has been standing.
+        most_mps: the highest speed that its driver takes the road to allow.
     """
 
     name: str
@@ -48,17 +52,16 @@ class Comer:
     speed_mps: float
     held: bool
     waiting_s: float
+    most_mps: float = math.inf
 
     @property
     def is_inside(self) -> bool:
         return self.distance_m < 0.0
 
     def arrival_s(self) -> float:
-        """Until it is at the junction, if it becomes faster."""
-        if self.is_inside:
-            return 0.0
-        v, a = self.speed_mps, FOE_ACCEL_MPS2
-        return (math.sqrt(v * v + 2.0 * a * self.distance_m) - v) / a
+        """Until it is at the junction, if it becomes as fast as it may."""
+        most_mps = max(self.most_mps, self.speed_mps, STANDS_MPS)
+        return 0.0 if self.is_inside else _drive_s(self.distance_m, self.speed_mps, most_mps, FOE_ACCEL_MPS2)
 
     def gone_s(self) -> float:
         """Until it has left the junction, if it goes on as fast as now."""
@@ -99,7 +102,8 @@ def comers(
             lane, distance, state = way
             waiting = float(libsumo.vehicle.getWaitingTime(name))
             rest = distance + lengths_m[lane] + length
-            found.append(Comer(name, row, lane, distance, rest, float(users.speed_mps[row]), state in "rRuyY", waiting))
+            most, speed = float(libsumo.vehicle.getAllowedSpeed(name)), float(users.speed_mps[row])
+            found.append(Comer(name, row, lane, distance, rest, speed, state in "rRuyY", waiting, most))
     return found
 
 
@@ -107,7 +111,7 @@ def _way_to(
     junction: str, name: str, here: str, along_m: float, rights: Rights, lane_of: Mapping[str, int]
 ) -> tuple[int, float, str] | None:
     """The lane inside the junction that a vehicle will take, its way to there, and the letter of the signal before it."""
-    distance = libsumo.lane.getLength(here) - along_m if here else math.inf
+    distance = _to_links_m(here) - along_m if here else math.inf
     for onward, _, _, _, via, state, _, length in libsumo.vehicle.getNextLinks(name)[:LINKS_AHEAD]:
         if distance > SIGHT_M:
             return None
@@ -116,6 +120,21 @@ def _way_to(
             return lane, max(distance, 0.0), state
         distance += length + libsumo.lane.getLength(onward)
     return None
+
+
+def _to_links_m(lane: str) -> float:
+    """From the beginning of a lane to the first of SUMO's next links: these begin at the end of the road.
+
+    For who is inside a junction that is the end of the road after it, which SUMO's list does not have.
+    """
+    length = float(libsumo.lane.getLength(lane))
+    for _ in range(LANES_INSIDE):
+        links = libsumo.lane.getLinks(lane) if lane.startswith(":") else ()
+        if not links:
+            break
+        lane = links[0][4] or links[0][0]  # the next lane inside, or the one beyond
+        length += float(libsumo.lane.getLength(lane))
+    return length
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,14 +162,23 @@ class Entry:
         return _drive_s(max(self.line_m, 0.0), self.speed_mps, STRAIGHT_MPS)
 
     def clear_s(self) -> float:
-        """Until the rear has left it."""
-        top = BEND_MPS if abs(self.turn_rad) > BEND_RAD else STRAIGHT_MPS
-        return _drive_s(max(self.line_m, 0.0) + self.way_m + LENGTH_M, self.speed_mps, top)
+        """Until the rear has left it, braking before a bend and going through it no faster than it allows."""
+        v, line_m, over_m = self.speed_mps, max(self.line_m, 0.0), self.way_m + LENGTH_M
+        top, there = self._through_mps(), min(math.sqrt(v * v + 2.0 * OWN_ACCEL_MPS2 * line_m), STRAIGHT_MPS)
+        if there <= top:
+            return _drive_s(line_m + over_m, v, top)
+        return self.enter_s() + (there - top) ** 2 / (2.0 * OWN_BRAKING_MPS2 * there) + over_m / top
+
+    def _through_mps(self) -> float:
+        """The speed through the junction."""
+        if abs(self.turn_rad) <= BEND_RAD:
+            return STRAIGHT_MPS
+        return min(BEND_MPS, TURN_RADPS * self.way_m / abs(self.turn_rad))
 
 
-def _drive_s(way_m: float, speed_mps: float, top_mps: float) -> float:
+def _drive_s(way_m: float, speed_mps: float, top_mps: float, accel_mps2: float = OWN_ACCEL_MPS2) -> float:
     """Time over a way, from a speed up to the highest one."""
-    v, a = min(speed_mps, top_mps), OWN_ACCEL_MPS2
+    v, a = min(speed_mps, top_mps), accel_mps2
     gaining_m = (top_mps**2 - v**2) / (2.0 * a)
     if way_m < gaining_m:
         return (math.sqrt(v * v + 2.0 * a * way_m) - v) / a

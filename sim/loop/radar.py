@@ -17,6 +17,7 @@ from hippodrome.sim.loop.users import Users
 
 REACH_M: Final = 100.0  # of an ordinary 77 GHz radar, in town
 BESIDE_M: Final = 0.3  # so much room is kept on each side of the ego's own swept path
+SWING_BESIDE_M: Final = -0.1  # and so much where a corner swings out beyond that: in bends one passes others by a hand
 MOST_TURN_RAD: Final = 0.5 * math.pi  # the swept path ends where it has turned by a right angle
 GAP_NOISE_M: Final = 0.1  # standard deviations of a measurement
 SPEED_NOISE_MPS: Final = 0.1
@@ -31,12 +32,14 @@ def nearest_ahead(
     users: Users,
     middle_m: float = CENTRE_AHEAD_M,
     bumper_m: float = REAR_AXLE_TO_FRONT_M,
+    tail_m: float = LENGTH_M - REAR_AXLE_TO_FRONT_M,
 ) -> tuple[float, float]:
     """Gap [m] from the front bumper along the swept path to the nearest road user, and that one's speed along it.
 
     The swept path is the band that the body covers if the steering stays as it is: an arc of the rear axle's curvature. Users
     are taken by points round their outlines. Without one in reach the gap is ``inf``. The body's middle and its bumper lie so far
-    ahead of the rear axle.
+    ahead of the rear axle, and its other end so far behind it. The corners on the outside of a bend swing out beyond the band of
+    the rear axle, of a car with its wheels at full lock by more than a metre.
     """
     if len(users.names) == 0:
         return math.inf, 0.0
@@ -44,14 +47,18 @@ def nearest_ahead(
     dx, dy = points[..., 0] - pose_m[0], points[..., 1] - pose_m[1]
     cos, sin = math.cos(pose_m[2]), math.sin(pose_m[2])
     forward, left = cos * dx + sin * dy, cos * dy - sin * dx
+    far = min(REACH_M, MOST_TURN_RAD / max(abs(curvature_1pm), 1e-6))  # who steers to and fro does not drive in a circle
     if abs(curvature_1pm) < 1e-4:
-        along, aside = forward, left
+        along, aside, swung = forward, left, np.full(forward.shape, -np.inf)
     else:  # the circle about (0, 1 / curvature): distance along it, and from it
         radius = 1.0 / curvature_1pm
         along = np.arctan2(forward, (radius - left) * np.sign(radius)) * abs(radius)
-        aside = radius - np.sign(radius) * np.hypot(forward, radius - left)
-    far = min(REACH_M, MOST_TURN_RAD / max(abs(curvature_1pm), 1e-6))  # who steers to and fro does not drive in a circle
+        apart = np.maximum(np.hypot(forward, radius - left), 1e-9)
+        aside = radius - np.sign(radius) * apart
+        swung = along - _outer_m(apart, abs(radius), bumper_m, tail_m)
     inside = (np.abs(aside) <= 0.5 * WIDTH_M + BESIDE_M) & (along > middle_m) & (along < far + bumper_m)
+    swings = ~inside & (swung > 0.0) & (swung < far)
+    along, inside = np.where(swings, swung + bumper_m, along), inside | swings
     if not inside.any():
         return math.inf, 0.0
     along = np.where(inside, along, np.inf)
@@ -62,10 +69,32 @@ def nearest_ahead(
     return max(place - bumper_m, 0.0), speed
 
 
+def _outer_m(apart_m: FloatArray, radius_m: float, bumper_m: float, tail_m: float) -> FloatArray:
+    """How far ahead of the rear axle, along its circle, the body reaches on circles that only its outer corners sweep.
+
+    On the circle of radius r about the centre of the bend, the bumper ends at the angle asin(bumper / r). Where r is larger
+    than what the bumper's corner sweeps, only the other end reaches out so far; its side begins at -acos(outer side / r). The
+    result is ``inf`` on circles that the body does not touch.
+
+    Args:
+        apart_m: radii of the circles.
+        radius_m: of the rear axle's circle.
+        bumper_m: from the rear axle to the end of the body in the direction of the drive.
+        tail_m: to the other end.
+    """
+    side_m = radius_m + 0.5 * WIDTH_M
+    front_m, rear_m = (math.hypot(side_m, end_m) + SWING_BESIDE_M for end_m in (bumper_m, tail_m))
+    by_bumper = np.arcsin(np.minimum(bumper_m / apart_m, 1.0))
+    by_tail = -np.arccos(np.minimum(side_m / apart_m, 1.0))
+    angle = np.where(apart_m <= front_m, by_bumper, np.where(apart_m <= rear_m, by_tail, np.inf))
+    return np.where(apart_m > side_m, radius_m * angle, np.inf)
+
+
 def nearest_behind_m(pose_m: tuple[float, float, float], curvature_1pm: float, users: Users) -> float:
     """Gap [m] from the rear bumper along what the body sweeps backwards to the nearest road user; ``inf`` without one."""
     turned = pose_m[0], pose_m[1], pose_m[2] + math.pi  # seen from behind, left is right
-    gap_m, _ = nearest_ahead(turned, -curvature_1pm, users, -CENTRE_AHEAD_M, LENGTH_M - REAR_AXLE_TO_FRONT_M)
+    rear_m = LENGTH_M - REAR_AXLE_TO_FRONT_M
+    gap_m, _ = nearest_ahead(turned, -curvature_1pm, users, -CENTRE_AHEAD_M, rear_m, REAR_AXLE_TO_FRONT_M)
     return gap_m
 
 

@@ -25,6 +25,7 @@ class Rights:
         self._lane = {name: lane for lane, name in enumerate(network.lane_ids)}
         self.junction_of: dict[int, str] = {}  # of the lanes inside junctions
         self.signal_of: dict[int, tuple[str, int]] = {}  # traffic light and number of the lamp, of first lanes inside junctions
+        self.ways_from: dict[int, list[int]] = {}  # the first lanes inside of junctions, of all ways on from a lane
         self.phases: dict[str, list[str]] = {}  # states of each traffic light, in all of its programs
         self._link: dict[int, int] = {}
         self._response: dict[str, list[int]] = {}
@@ -94,5 +95,9 @@ class Rights:
                 before = self._lane.get(f"{attributes['from']}_{attributes['fromLane']}")
                 if before is not None:
                     self._vias[before] = via
-            elif attributes.get("tl"):
+                return
+            before = self._lane.get(f"{attributes['from']}_{attributes['fromLane']}")
+            if before is not None:
+                self.ways_from.setdefault(before, []).append(via)
+            if attributes.get("tl"):
                 self.signal_of[via] = attributes["tl"], int(attributes["linkIndex"])

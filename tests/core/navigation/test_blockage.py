@@ -11,10 +11,11 @@ from hippodrome.core.navigation.blockage import Blockage
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.motion import Motion
 from hippodrome.core.navigation.pilot import RoutePlanner
+from hippodrome.core.navigation.track import begun
 from hippodrome.core.navigation.types import Goal, Lamp, Radar
 from hippodrome.core.navigation.whereabouts import Whereabouts
 from hippodrome.core.roads.geometry import road_geometry
-from tests.core.navigation.roads import map_along, street
+from tests.core.navigation.roads import map_along, ring, street
 from tests.core.navigation.test_whereabouts import Eyes, drive, stepping
 
 
@@ -57,6 +58,23 @@ def test_nothing_is_closed_at_a_red_lamp_nor_before_somebody_far_ahead():
     for gap_m, lamp in ((4.0, Lamp.RED), (30.0, Lamp.NONE)):
         _, planner, _, turns = blocked(street(), (50.0, -1.6, 0.0), Goal(75.0, -1.6, 0.0), gap_m, lamp)
         assert not planner.closed and not turns
+
+
+@pytest.mark.parametrize(("begin_m", "turns_s"), [(20.0, 15.0), (50.0, 30.0)])
+def test_what_stands_far_before_a_junction_is_no_queue_and_is_not_waited_for_so_long(begin_m, turns_s):
+    network, config, turns = ring(), NavigatorConfig(), []
+    planner = RoutePlanner(map_along(network), network, config)
+    planner.set_goal(Goal(100.0, 60.0, 0.5 * math.pi))
+    belief = Belief(config, planner, -1.0)
+    pose = np.array([begin_m, 0.0, 0.0])
+    belief.track, belief.plan = begun(pose, np.diag([0.1, 0.1, 0.01])), planner.plan(pose, 0.0)
+    escape = SimpleNamespace(barred=lambda gap_m: turns.append(gap_m) or True)
+    watch = Blockage(config, SimpleNamespace(motion=Motion()), belief, planner, escape, None)
+    times = []
+    for k in range(400):
+        watch.step(Radar(gap_m=4.0), False, 0.1)
+        times += [0.1 * (k + 1)] * (len(turns) - len(times))
+    assert times[0] == pytest.approx(turns_s, abs=0.3)
 
 
 def test_after_turning_round_the_hypotheses_are_on_the_lane_of_the_other_direction():

@@ -99,3 +99,24 @@ def test_the_motion_counts_backwards_and_brakes_before_it_changes():
     assert motion.speed_mps == pytest.approx(-1.0)
     assert motions.commanded(motion, -3.0, 0.0, 1.0, reverse=True).speed_mps == 0.0
     assert motions.commanded(motion, 3.0, 0.0, 0.1).speed_mps == pytest.approx(-0.7)
+
+
+def test_a_turn_lets_those_pass_who_come_while_it_is_under_way():
+    car = Bicycle((0.0, 0.0, 0.0))
+
+    def replan(first):
+        return plan_turn(car.pose.tolist(), (0.0, 3.2, math.pi), lambda p: np.minimum(p[:, 1] + 1.6, 4.8 - p[:, 1]), VEHICLE)
+
+    turn, clock = Turn(replan, lambda leg: True, replan(0), DrivingState.DRIVING, VEHICLE), [0.0]
+
+    def comes(car):
+        """Somebody comes at 7 m/s from 4 s on, passes at 8.5 s, and is gone."""
+        clock[0] += 0.1
+        away_m = 7.0 * abs(8.5 - clock[0])
+        return Radar(moving_m=away_m if 4.0 < clock[0] < 12.0 and away_m < 50.0 else math.inf)
+
+    poses, _ = driven(turn, car, 16.0, comes)
+    speed = np.hypot(*np.diff(poses[:, :2], axis=0).T) / 0.1
+    assert speed[40:55].max() > 0.3  # far away it does not matter
+    assert speed[70:84].max() < 0.05  # it stands as he passes
+    assert speed[95:].max() > 0.3

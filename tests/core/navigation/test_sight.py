@@ -17,6 +17,7 @@ from hippodrome.core.navigation.border import (
     borders,
     room_fields,
 )
+from hippodrome.core.navigation.rounding import bends_of, rounded
 from hippodrome.core.navigation.sight import Ground
 from hippodrome.core.navigation.sweep import STEP_M, STEPS, drivable
 from hippodrome.core.views.config import CameraGeometry
@@ -137,3 +138,48 @@ def test_the_ground_below_the_car_is_road_from_the_first_frame_on():
     ground.see(np.full((120, 160, 3), 100, dtype=np.uint8), math.inf)
     way = ground.way(0.0, -1.0, 1.35, False, 14.0, 0.95)
     assert way.free_m == math.inf and way.seen_m > 3.0
+
+
+def test_behind_a_kerb_there_is_no_road_and_round_its_end_the_border_goes_on_half_way():
+    part = cells()
+    part[:80, :40] = UNKNOWN
+    part[:80, 34:40] = OTHER  # a pavement that ends, seen from beside it ..
+    i, j = np.meshgrid(np.arange(160), np.arange(40), indexing="ij")
+    part[:, :40][i - 80 < 40 - j] = np.where(part[:, :40][i - 80 < 40 - j] == ROAD, UNKNOWN, part[:, :40][i - 80 < 40 - j])
+    found = borders(part)  # .. with the last line of sight past its end at 45 degrees
+    assert found[20:70, 5:30].all() and not found[:, 45:].any()
+    assert found[66, 5] and not found[92, 20]
+
+
+def sharp_corner(side, beside_m=1.35):
+    """A road along x beside a border, and one that leads aside from its end: the border's cells, and the line along it."""
+    barrier = np.zeros((160, 160), dtype=np.uint8)
+    corner, border = 60, 80
+    barrier[:corner, slice(0, border) if side < 0.0 else slice(border, None)] = 1
+    middle, end = border * CELL_M - side * beside_m, corner * CELL_M
+    before = [(x, middle, 0.0) for x in np.arange(end - 7.0, end, 0.25)]
+    turns = np.arange(0.0, 0.5 * math.pi, 0.25 / beside_m)
+    arc = [(end + beside_m * math.sin(a), middle + side * beside_m * (1.0 - math.cos(a)), side * a) for a in turns]
+    after = [(end + beside_m, border * CELL_M + side * s, side * 0.5 * math.pi) for s in np.arange(0.0, 6.0, 0.25)]
+    return barrier, np.array(before + arc + after)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_the_line_round_a_sharp_corner_is_one_that_the_car_can_drive_into_its_lane(side):
+    barrier, line = sharp_corner(side)
+    field = field_of(barrier)
+    led = rounded(line, 0.0, side, field, CORNER, CELL_M)
+    bends = bends_of(led, field, CORNER, CELL_M, 0.9, 50)
+    assert len(bends) == 50 and np.abs(bends[:, 0]).max() < 0.34  # within the turning circle, and clear of the kerb
+    assert led[0] == pytest.approx(line[0]) and abs(led[-1, 2] - side * 0.5 * math.pi) < 0.1
+    apart_m = led[-12:, 0] - 60 * CELL_M  # from the border of the street that it leads into
+    assert np.all(apart_m > 0.9) and np.all(apart_m < 1.9)
+
+
+def test_who_is_late_for_a_corner_turns_at_once_and_a_line_without_one_stays_as_it_is():
+    barrier, line = sharp_corner(-1.0)
+    late = line[24:]  # a metre before the corner
+    led = rounded(late, 0.0, -1.0, field_of(barrier), CORNER, CELL_M)
+    assert led[6, 2] < -0.2 and not np.allclose(led[:, :2], late[:, :2])
+    assert len(bends_of(led, np.zeros((160, 160)), CORNER, CELL_M, 0.9, 20)) == 0
+    assert np.array_equal(rounded(straight_line(), 0.0, -1.0, field_of(barrier), CORNER, CELL_M), straight_line())

@@ -8,7 +8,9 @@ import pytest
 from hippodrome.core.navigation import motion as motions
 from hippodrome.core.navigation import track as tracks
 from hippodrome.core.navigation.config import DriveConfig, NavigatorConfig, VehicleShape, WatchConfig
+from hippodrome.core.navigation.course import make_course, next_gate, next_mouth
 from hippodrome.core.navigation.dashes import driven_m, line_levels
+from hippodrome.core.navigation.driving import pace
 from hippodrome.core.navigation.junctions import gate_speed_mps, room_to_stop_m
 from hippodrome.core.navigation.searching import LaneMemory
 from hippodrome.core.navigation.senses import Senses
@@ -17,8 +19,10 @@ from hippodrome.core.navigation.steering import lane_curvature_1pm, steering_rad
 from hippodrome.core.navigation.types import Lamp, Radar
 from hippodrome.core.navigation.watch import SensorHealth, watched
 from hippodrome.core.reading.types import LaneEnd, RoadReading
+from hippodrome.core.roads.paths import Piece
 from hippodrome.core.types import Observation
 from hippodrome.core.views.config import CameraGeometry
+from tests.core.navigation.roads import network_of
 
 DRIVE, VEHICLE, CAMERA = DriveConfig(), VehicleShape(), CameraGeometry()
 
@@ -227,3 +231,24 @@ def test_a_scale_that_is_told_anew_is_heard_as_at_the_first_time():
     expected = motions.told(motions.Motion(), 1.0, 1.0)
     assert again.scale_without_dashes(1.5) == expected.scale_without_dashes(1.5)
     assert known.scale_without_dashes(1.5)[1] < 0.5 * again.scale_without_dashes(1.5)[1]
+
+
+def test_nobody_is_waited_for_where_one_road_merely_goes_on_as_another():
+    """Lane 0, 1 inside, 2 a road that bends on; 3 inside, 4: a crossing, which lane 5 crosses inside."""
+    lines = [
+        [(0.0, 0.0), (40.0, 0.0)], [(40.0, 0.0), (44.0, 0.0)], [(44.0, 0.0), (80.0, 0.0)], [(80.0, 0.0), (94.0, 0.0)],
+        [(94.0, 0.0), (150.0, 0.0)], [(87.0, -7.0), (87.0, 7.0)],
+    ]  # fmt: skip
+    network = network_of(lines, [(0, 1), (1, 2), (2, 3), (3, 4)], internal=(1, 3, 5))
+    pieces = [Piece(lane, 0.0, math.dist(*line), False, 10.0) for lane, line in enumerate(lines[:5])]
+    course = make_course(network, pieces, 4, 50.0, NavigatorConfig().drive, NavigatorConfig().vehicle)
+    assert [gate.meets_others for gate in course.gates] == [False, True]
+    assert next_gate(course, 30.0).entry_u_m == pytest.approx(40.0, abs=0.5)
+    assert next_mouth(course, 30.0).entry_u_m == pytest.approx(80.0, abs=0.5)
+    config = NavigatorConfig()
+    step = pace(course, 34.0, 5.0, Radar(way_is_free=False), 0.0, config.drive, config.vehicle)
+    assert step.reason == "" and step.speed_mps > 5.0  # who comes has the right of way at the crossing, 40 m ahead
+    step = pace(course, 72.0, 2.0, Radar(way_is_free=False), 0.0, config.drive, config.vehicle)
+    assert step.reason == "gives way"
+    step = pace(course, 34.0, 5.0, Radar(lamp=Lamp.RED), 0.0, config.drive, config.vehicle)
+    assert step.reason == "waits at a red light"  # a signal may stand anywhere

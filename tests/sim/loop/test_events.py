@@ -8,7 +8,8 @@ import pytest
 
 from hippodrome.core.navigation.types import Indicator, Lamp
 from hippodrome.core.types import HippodromeError
-from hippodrome.sim.loop.radar import nearest_ahead
+from hippodrome.sim.loop.junction import comers
+from hippodrome.sim.loop.radar import nearest_ahead, nearest_behind_m
 from hippodrome.sim.loop.types import EventKind, LanePlace
 from hippodrome.sim.loop.users import Users
 from hippodrome.sim.loop.world import World
@@ -160,3 +161,48 @@ def test_the_radar_follows_the_steering_and_looks_no_further_than_a_right_angle(
     assert gap(20.0, 4.0, 2.0 * 4.0 / (20.0**2 + 4.0**2))[0] < 20.0
     assert gap(-20.0, 0.0, 0.0)[0] == math.inf
     assert gap(0.0, 10.0, 0.2)[0] == math.inf
+
+
+def test_the_radar_sees_whom_the_outer_corner_swings_into():
+    def users(x, y, heading=0.0):
+        return Users(("a",), np.array([1]), np.array([0], np.uint8), np.array([[x, y, heading]]), np.array([0.0]))
+
+    pose, lock = (0.0, 0.0, 0.0), 1.0 / 3.0
+    assert nearest_ahead(pose, lock, users(5.0, -2.2, 0.5 * math.pi))[0] < 1.0  # the front right corner comes there
+    assert nearest_ahead(pose, lock, users(5.6, -2.2, 0.5 * math.pi))[0] == math.inf
+    beside = users(1.5, -2.4)  # parallel, half a metre beside: no way to back with the wheels at full lock
+    assert nearest_behind_m(pose, 0.0, beside) == math.inf
+    assert nearest_behind_m(pose, lock, beside) < 2.0
+    assert nearest_behind_m(pose, lock, users(1.5, -4.5)) == math.inf
+
+
+def test_who_is_in_another_junction_is_as_far_as_the_road_between_is_long(tmp_path):
+    with World(small.scenario(), tmp_path, draw=False) as world:
+        network, ways, rights = world.network, world.ways, world._rights
+        lane_of = {name: lane for lane, name in enumerate(network.lane_ids)}
+        world.reset(1)
+        before, way, onward = next(
+            (lane, one, two)
+            for lane in range(network.lane_count)
+            if not network.is_internal[lane] and world.ground.lane_length_m(lane) > 30.0
+            for one in ways.out_of(lane)
+            if one.inside
+            for two in ways.out_of(one.target)
+            if two.inside and network.lane_edge[two.target] != network.lane_edge[lane]
+        )
+        edges = [network.edge_ids[network.lane_edge[lane]] for lane in (before, way.target, onward.target)]
+        small.car("b930", edges, libsumo.lane.getLength(network.lane_ids[before]) - 12.0, 5.0)
+        junction, lengths = rights.junction_of[onward.inside[0]], [world.ground.lane_length_m(k) for k in range(len(lane_of))]
+        told, inside = [], []
+        for _ in range(120):
+            libsumo.simulationStep()
+            if "b930" not in libsumo.vehicle.getIDList():
+                continue
+            x, y = libsumo.vehicle.getPosition("b930")
+            users = Users(("b930",), np.array([1]), np.array([0], np.uint8), np.array([[x, y, 0.0]]), np.array([5.0]))
+            found = comers(junction, users, (x, y), rights, lane_of, lengths)
+            if found and not found[0].is_inside:
+                told.append(found[0].distance_m)
+                inside.append(libsumo.vehicle.getLaneID("b930").startswith(":"))
+    assert any(inside) and not all(inside)
+    assert np.abs(np.diff(told)).max() < 2.0  # it comes nearer as it drives, and never all at once

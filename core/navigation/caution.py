@@ -1,0 +1,78 @@
+"""Ways that are driven by what is likely, and not by what is known: whether they are seen to be road, and how fast to go."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from hippodrome.core.navigation.border import OTHER, ROAD, UNKNOWN
+from hippodrome.core.navigation.sight import Ground
+from hippodrome.core.navigation.ways import strip
+from hippodrome.core.types import FloatArray
+
+SEEN, NOT_ROAD = 0.7, 0.05  # so much of a guess must have been seen, and hardly any of it be no road
+AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of a way, which must not lead off the road
+OFF_ROAD: Final = 0.15  # of it
+LEAST_PLACES: Final = 2  # of a way that are seen to be no road: one alone is a speck
+ACROSS_M: Final = 9.0  # from where a turn begins to what lies across: a road of 6.4 m, and the way in which the wheels turn
+CORNER_M: Final = 4.5  # from where the wheels begin to turn to where the border ends: sharp corners are begun 2.8 m before
+TURN_MPS: Final = 2.5  # at which the wheels can be turned in that way
+BRAKING_MPS2: Final = 2.5  # comfortable
+BESIDE_M: Final[FloatArray] = np.arange(1.0, 2.7, 0.2)  # from a way, where the border on the own side is looked for
+GAP_PLACES: Final = 4  # places of a way without a border beside them, from which on it has ended: not a dent in it
+BEYOND_M: Final = (6.4, 8.0)  # beyond the end of the border the road goes on, if there is road
+GOES_ON: Final = 0.6  # so much of that must be seen, and be road
+
+
+def seems_road(ground: Ground, ahead: FloatArray) -> bool:
+    """Whether a way (n, 3), in the vehicle's axes, has been seen, and to be road."""
+    kinds = ground.kinds_at(strip(ahead, HALF_BODY_M))
+    return bool(np.mean(kinds != UNKNOWN) > SEEN and np.mean(kinds == OTHER) < NOT_ROAD)
+
+
+def leads_off_road(ground: Ground, ahead: FloatArray) -> bool:
+    """Whether a way (n, 3), in the vehicle's axes, is seen to lead where there is no road."""
+    near = ahead[(ahead[:, 0] > AHEAD_M[0]) & (np.hypot(ahead[:, 0], ahead[:, 1]) < AHEAD_M[1])]
+    return len(near) > 0 and ground.off_road_share(strip(near, HALF_BODY_M)) > OFF_ROAD
+
+
+def turn_mps(ground: Ground, ahead: FloatArray, side: float) -> float:
+    """The speed from which the vehicle is slow enough to turn where the road may bend away; infinite where it does not.
+
+    It may where something lies across the way, and where the border on the own side ends and it is not seen that the road goes on
+    beyond. That may be a side street: by the time that the vehicle is near, it is seen.
+
+    Args:
+        ground: what was seen of it.
+        ahead: poses (n, 3) of the way, in the vehicle's axes, evenly spaced.
+        side: of the border: -1 right, 1 left.
+    """
+    if len(ahead) < 2:
+        return math.inf
+    along = np.hypot(ahead[:, 0], ahead[:, 1])
+    kinds = ground.kinds_at(ahead[:, :2])
+    barred = np.flatnonzero(np.cumsum(kinds == OTHER) >= LEAST_PLACES)
+    room_m = math.inf if len(barred) == 0 else float(along[barred[0]]) - ACROSS_M
+    end = _border_end(ground, ahead, side)
+    if end is not None:
+        beyond = (along > along[end] + BEYOND_M[0]) & (along < along[end] + BEYOND_M[1])
+        goes_on = bool(beyond.any()) and float(np.mean(kinds[beyond] == ROAD)) > GOES_ON
+        room_m = room_m if goes_on else min(room_m, float(along[end]) - CORNER_M)
+    return math.sqrt(TURN_MPS**2 + 2.0 * BRAKING_MPS2 * max(room_m, 0.0)) if math.isfinite(room_m) else math.inf
+
+
+def _border_end(ground: Ground, ahead: FloatArray, side: float) -> int | None:
+    """The place of a way (n, 3) beside which the border on the own side has ended; None where none is seen to end."""
+    aside = side * np.stack([-np.sin(ahead[:, 2]), np.cos(ahead[:, 2])], axis=1)
+    points = ahead[:, None, :2] + BESIDE_M[None, :, None] * aside[:, None, :]
+    kinds = ground.kinds_at(points.reshape(-1, 2)).reshape(len(ahead), -1)
+    bordered = np.any(kinds >= OTHER, axis=1)
+    seen_road = np.mean(kinds == ROAD, axis=1) > GOES_ON
+    if not bordered[0]:
+        return None
+    for k in range(1, len(ahead) - GAP_PLACES + 1):
+        if not bordered[k : k + GAP_PLACES].any():
+            return k if seen_road[k : k + GAP_PLACES].any() else None
+    return None

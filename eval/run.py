@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hippodrome._files import write_atomically
+from hippodrome._native import give_back_memory
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.contest.entry import Added, entries_of, with_methods
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
@@ -104,7 +105,7 @@ def load_scenarios(
 
 def make_recordings(plans: Sequence[RecordingPlan], pool: Workers) -> None:
     """Simulate and draw the drives that are not on disk yet."""
-    chunks = pool.run("simulate", prepare, plans, place=driven_place)
+    chunks = pool.run("simulate", _prepare, plans, place=driven_place)
     pool.run("render", _render_chunk, [(plan, chunk) for plan, missing in zip(plans, chunks, strict=True) for chunk in missing],
              weight=lambda _: CHUNK_FRAMES)  # fmt: skip
     pool.run("seal", _finish, plans)
@@ -114,6 +115,14 @@ def driven_place(plan: RecordingPlan) -> str:
     """What a drive is simulated on, in words."""
     network = plan.scenario.town.network
     return f"{network} ({plan.scenario.name})" if network is not None else f"the generated town of {plan.scenario.name}"
+
+
+def _prepare(plan: RecordingPlan) -> list[int]:
+    """Simulate a drive; what SUMO held of a large network goes back before the town is drawn."""
+    try:
+        return prepare(plan)
+    finally:
+        give_back_memory(cycles=True)
 
 
 def _render_chunk(task: tuple[RecordingPlan, int]) -> int:

@@ -4,7 +4,6 @@ Not public."""
 from __future__ import annotations
 
 import ctypes
-import gc
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -35,16 +34,11 @@ def unheard() -> Iterator[None]:
         os.close(kept)
 
 
-def give_back_memory(*, cycles: bool = False) -> None:
+def give_back_memory() -> None:
     """Give what was freed back to the system, where the C library can (glibc); elsewhere nothing happens.
 
     glibc keeps what lies below anything that is still in use: after a simulation of 1,000 km of road that is 400 MB, on top of
     which the next stage would take its own. Results do not depend on it. It takes some 10 ms.
-
-    Args:
-        cycles: Whether Python's objects that hold one another are freed first, which takes longer.
     """
-    if cycles:
-        gc.collect()
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)

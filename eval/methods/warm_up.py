@@ -14,7 +14,6 @@ from typing import Final, get_args
 import numpy as np
 
 from hippodrome._folders import temporary_folder
-from hippodrome._native import give_back_memory
 from hippodrome.core.localization.beliefs.config import Mode
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
 from hippodrome.core.mapping.config import MapperConfig
@@ -59,19 +58,15 @@ def warm_up() -> None:
         for t_s, speed, yaw_rate, frame in zip(motion.t_s, motion.speed, motion.yaw_rate_radps, _frames(), strict=False)
     ]
     cognitive_map, _ = map_recording(observed, Mapper(MapperConfig(road_reading=True)))
-    give_back_memory(cycles=True)  # where functions are compiled, each stage leaves a hundred megabytes
     for refinement_mode in ("paper", "route"):
         try:
             refinement = refine(cognitive_map, town.network, RefineConfig(mode=refinement_mode), start)
         except HippodromeError:
             continue  # a refinement that refuses the map has called its functions all the same
-        finally:
-            give_back_memory(cycles=True)
     for mode in get_args(Mode):
         localizer = LocalizerConfig(mode=mode, road_reading=mode in READING_MODES)
         share = 1.0 if mode == "coupled" else SHORT_SHARE
         localize_recording(observed[: round(share * len(observed))], Localizer(refinement.cognitive_map, town.network, localizer))
-    give_back_memory(cycles=True)
 
 
 def _frames() -> Iterator[Frame]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import mmap
-from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -37,9 +36,10 @@ def empty_states(model: SearchModel) -> IntArray:
     if count < _MANY_STATES or not hasattr(mmap, "MAP_PRIVATE"):
         return np.zeros(count, np.int32)
     pages = mmap.mmap(-1, 4 * count, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-    if hasattr(mmap, "MADV_NOHUGEPAGE"):
-        with suppress(OSError):  # a kernel without large pages does not know them
-            pages.madvise(mmap.MADV_NOHUGEPAGE)
+    try:  # noqa: SIM105  # core imports numbers only
+        pages.madvise(mmap.MADV_NOHUGEPAGE)
+    except (AttributeError, OSError):  # a system without large pages does not know them
+        pass
     return np.frombuffer(pages, np.int32)
 
 

@@ -20,7 +20,7 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.eval.contest.entry import Added, entries_of, with_methods
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.files.scenarios import read_scenario
-from hippodrome.eval.methods.warm_up import warm_up
+from hippodrome.eval.methods.warm_up import is_compiled, warm_up
 from hippodrome.eval.pool import Workers, process_pool, worker_pool
 from hippodrome.eval.report.report import REPORT, write_report
 from hippodrome.eval.results.model import Results, write_results
@@ -123,8 +123,10 @@ def driven_place(plan: RecordingPlan) -> str:
 
 def _compile_apart() -> None:
     """Compile our inner loops in a process of its own, which ends: compiling leaves 450 MB behind, which the evaluation of 1,000
-    km of road has no room for within a gigabyte. Where the machine code is kept already, it takes 4 s.
+    km of road has no room for within a gigabyte. Where the machine code is kept already, there is nothing to do.
     """
+    if is_compiled():
+        return
     with suppress(BrokenProcessPool), process_pool(1) as compiler:  # if it dies, the evaluation compiles
         compiler.submit(warm_up).result()
 

@@ -43,6 +43,7 @@ def test_a_large_town_is_evaluated_in_processes_that_did_not_draw_it(tmp_path, m
 
 def test_what_compiles_is_no_process_that_evaluates(monkeypatch):
     monkeypatch.setattr(run, "warm_up", os.getpid)
+    monkeypatch.setattr(run, "is_compiled", lambda: False)
     asked = []
 
     @contextmanager
@@ -53,8 +54,12 @@ def test_what_compiles_is_no_process_that_evaluates(monkeypatch):
     monkeypatch.setattr(run, "process_pool", process_pool)
     run._compile_apart()
     assert asked == [1, os.getpid]
+    monkeypatch.setattr(run, "is_compiled", lambda: True)
+    run._compile_apart()
+    assert asked == [1, os.getpid]
 
 
 def test_who_dies_over_compiling_leaves_it_to_the_evaluation(monkeypatch):
     monkeypatch.setattr(run, "warm_up", os.abort)
+    monkeypatch.setattr(run, "is_compiled", lambda: False)
     run._compile_apart()

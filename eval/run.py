@@ -10,14 +10,18 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from pathlib import Path
 
 from hippodrome._files import write_atomically
+from hippodrome._native import give_back_memory
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.contest.entry import Added, entries_of, with_methods
 from hippodrome.eval.evaluate import EvaluationTask, evaluate_scenario
 from hippodrome.eval.files.scenarios import read_scenario
-from hippodrome.eval.pool import Workers, worker_pool
+from hippodrome.eval.methods.warm_up import is_compiled, warm_up
+from hippodrome.eval.pool import Workers, process_pool, worker_pool
 from hippodrome.eval.report.report import REPORT, write_report
 from hippodrome.eval.results.model import Results, write_results
 from hippodrome.eval.results.paper_rows import quoted_rows
@@ -67,6 +71,7 @@ def run_scenarios(scenarios: Sequence[Scenario], workers: int, out: Path) -> Res
         if not any(scenario.town.network and is_large(scenario.town.network) for scenario in scenarios):
             rows = pool.run(EVALUATE, evaluate_scenario, tasks)
     if rows is None:  # processes that simulated and drew a large town hold as much again as the evaluation takes
+        _compile_apart()
         with worker_pool(workers, (EVALUATE,), out) as pool:
             rows = pool.run(EVALUATE, evaluate_scenario, tasks)
     results = Results(scenarios=tuple(rows))
@@ -104,7 +109,7 @@ def load_scenarios(
 
 def make_recordings(plans: Sequence[RecordingPlan], pool: Workers) -> None:
     """Simulate and draw the drives that are not on disk yet."""
-    chunks = pool.run("simulate", prepare, plans, place=driven_place)
+    chunks = pool.run("simulate", _prepare, plans, place=driven_place)
     pool.run("render", _render_chunk, [(plan, chunk) for plan, missing in zip(plans, chunks, strict=True) for chunk in missing],
              weight=lambda _: CHUNK_FRAMES)  # fmt: skip
     pool.run("seal", _finish, plans)
@@ -114,6 +119,24 @@ def driven_place(plan: RecordingPlan) -> str:
     """What a drive is simulated on, in words."""
     network = plan.scenario.town.network
     return f"{network} ({plan.scenario.name})" if network is not None else f"the generated town of {plan.scenario.name}"
+
+
+def _compile_apart() -> None:
+    """Compile our inner loops in a process of its own, which ends: compiling leaves 450 MB behind, which the evaluation of 1,000
+    km of road has no room for within a gigabyte. Where the machine code is kept already, there is nothing to do.
+    """
+    if is_compiled():
+        return
+    with suppress(BrokenProcessPool), process_pool(1) as compiler:  # if it dies, the evaluation compiles
+        compiler.submit(warm_up).result()
+
+
+def _prepare(plan: RecordingPlan) -> list[int]:
+    """Simulate a drive; what SUMO held of a large network goes back before the town is drawn."""
+    try:
+        return prepare(plan)
+    finally:
+        give_back_memory()
 
 
 def _render_chunk(task: tuple[RecordingPlan, int]) -> int:

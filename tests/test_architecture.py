@@ -45,7 +45,10 @@ EVAL_ROOMS = (
     "commands", "cli",
 )  # fmt: skip
 CORE_PACKAGES = {"cv2", "numba", "numpy", "scipy"}
-STANDARD_IN_CORE = {"__future__", "collections", "dataclasses", "enum", "functools", "heapq", "itertools", "math", "typing"}
+STANDARD_IN_CORE = {
+    "__future__", "collections", "dataclasses", "enum", "functools", "heapq", "itertools", "math", "typing",
+    "mmap",  # memory without a file, for tables of which little is touched
+}  # fmt: skip
 
 
 def imports(path):

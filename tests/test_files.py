@@ -1,6 +1,7 @@
 """Files are whole or absent, and hashes of code tell a changed, a renamed and a new file."""
 
 import ast
+import ctypes
 import hashlib
 import os
 import sys
@@ -99,6 +100,25 @@ def test_it_lies_beneath_all_parts():
                 found |= {node.module} if isinstance(node, ast.ImportFrom) else {alias.name for alias in node.names}
     beneath = {"hippodrome.core.types", "hippodrome._folders"}
     assert {name for name in found if name.split(".")[0] not in sys.stdlib_module_names} == beneath
+
+
+def test_what_was_freed_goes_back_to_the_system():
+    status = Path("/proc/self/status")
+    if not status.exists() or not hasattr(ctypes.CDLL(None), "malloc_trim"):
+        pytest.skip("this C library keeps what is freed, or this system does not say what a process holds")
+
+    def held_bytes():
+        return 1024 * int(status.read_text().partition("VmRSS:")[2].split()[0])
+
+    pieces = [bytes(60_000) for _ in range(2_000)]  # small enough for the heap, 120 MB together
+    del pieces[:-1]  # the last one lies above the others
+    _native.give_back_memory()
+    before = held_bytes()
+    pieces = [bytes(60_000) for _ in range(2_000)]
+    assert held_bytes() - before > 60e6
+    del pieces[:-1]
+    _native.give_back_memory()
+    assert held_bytes() - before < 20e6
 
 
 def test_what_native_libraries_say_is_unheard_and_the_rest_is_not(capfd):

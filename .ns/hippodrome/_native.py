@@ -1,10 +1,12 @@
-"""Complaints of native libraries, which write to the process's standard error past Python. Not public."""
+"""Native libraries: their complaints, which go to the process's standard error past Python, and the memory that they keep.
+Not public."""
 
 from __future__ import annotations
 
+import ctypes
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Final
 
 STANDARD_ERROR: Final = 2
@@ -30,3 +32,13 @@ def unheard() -> Iterator[None]:
     finally:
         os.dup2(kept, STANDARD_ERROR)
         os.close(kept)
+
+
+def give_back_memory() -> None:
+    """Give what was freed back to the system, where the C library can (glibc); elsewhere nothing happens.
+
+    glibc keeps what lies below anything that is still in use: after a simulation of 1,000 km of road that is 400 MB, on top of
+    which the next stage would take its own. Results do not depend on it. It takes some 10 ms.
+    """
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)

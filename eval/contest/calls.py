@@ -10,6 +10,7 @@ from time import process_time
 
 import numpy as np
 
+from hippodrome._native import give_back_memory
 from hippodrome.core.types import FloatArray, HippodromeError, LocalizationEstimate, Observation, StartPose, Trajectory
 from hippodrome.eval.contest.answers import sound_cost, sound_estimates, sound_map
 from hippodrome.eval.contest.entry import Entry
@@ -165,6 +166,7 @@ def _draw(entry: Entry, materials: Materials, drawn: Mapping[str, Drawn | str], 
     feed.settle()
     mapped = sound_map(mapped, label)
     peak_rss_bytes = growth.as_if_alone_bytes() if mapped.cost is None else mapped.cost.peak_rss_bytes
+    give_back_memory()
     if mapped.cost is None and base is not None and peak_rss_bytes is not None:
         peak_rss_bytes = max(peak_rss_bytes, base.peak_rss_bytes or 0)
     map_bytes = guarded(label, lambda: _save(entry, mapped, materials), materials)

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from hippodrome._folders import temporary_folder
+from hippodrome._native import give_back_memory
 from hippodrome.core.se2 import interpolate
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
 from hippodrome.eval.contest.apart import Apart
@@ -79,6 +80,8 @@ def perform(materials: Materials, entries: Sequence[Entry]) -> Performance:
             else:
                 rows.append(row)
                 outcomes.append(outcome)
+            finally:
+                give_back_memory()
     return Performance(rows, outcomes, unscored)
 
 

@@ -6,16 +6,15 @@ Linux lets a process forget the most memory that it held, so that what it holds 
 
 from __future__ import annotations
 
-import ctypes
 import subprocess
 import sys
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from hippodrome._native import give_back_memory
 from hippodrome.core.mapping.config import MapperConfig
 from hippodrome.core.mapping.mapper import Mapper
 from hippodrome.core.types import Observation
@@ -31,8 +30,7 @@ class Growth:
     """What the process holds more than when this was made, at most."""
 
     def __init__(self) -> None:
-        with suppress(OSError, AttributeError):
-            ctypes.CDLL(None).malloc_trim(0)  # what was freed before would be filled again unseen
+        give_back_memory()  # what was freed before would be filled again unseen
         self._before_bytes = _figure_bytes("VmRSS") if _forget_peak() else None
 
     def as_if_alone_bytes(self) -> int | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
+from pathlib import Path
 from typing import Final, get_args
 
 import numpy as np
@@ -18,6 +19,7 @@ from hippodrome.core.localization.beliefs.config import Mode
 from hippodrome.core.localization.localizer import Localizer, LocalizerConfig
 from hippodrome.core.mapping.config import MapperConfig
 from hippodrome.core.mapping.mapper import Mapper
+from hippodrome.core.matching.search import beam
 from hippodrome.core.reading.ground import ground_of
 from hippodrome.core.refinement.config import RefineConfig
 from hippodrome.core.refinement.refine import refine
@@ -67,6 +69,13 @@ def warm_up() -> None:
         localizer = LocalizerConfig(mode=mode, road_reading=mode in READING_MODES)
         share = 1.0 if mode == "coupled" else SHORT_SHARE
         localize_recording(observed[: round(share * len(observed))], Localizer(refinement.cognitive_map, town.network, localizer))
+
+
+def is_compiled() -> bool:
+    """Whether machine code of the route search, the largest of the inner loops, is kept and newer than its source."""
+    source = Path(str(beam.__file__))
+    kept = Path(str(beam._forward.stats.cache_path)).glob(f"{source.stem}._forward-*.nbi")
+    return max((index.stat().st_mtime for index in kept), default=0.0) > source.stat().st_mtime
 
 
 def _frames() -> Iterator[Frame]:

@@ -21,6 +21,8 @@ from hippodrome.core.matching.search.states import Scratch, empty_states, forget
 from hippodrome.core.matching.search.successors import MOST_SUCCESSORS, jump_bar, successors
 from hippodrome.core.types import FloatArray, IntArray
 
+MANY_ROWS = 250_000  # 6 MB: a search that keeps more may keep up to its limit, and has the room for that at once
+
 
 class BeamLimits(NamedTuple):
     """What bounds the forward pass."""
@@ -64,6 +66,8 @@ def _forward(
     scratch, died_out = make_scratch(model, empty), False
     for t in range(1, samples):
         begin, end = row_start[t - 1], row_start[t]
+        if end > MANY_ROWS:  # room costs nothing until it is written to; while it doubled, the old and the new were 300 MB
+            rows = with_room(rows, limits.most_rows + limits.most_rows // 2)
         observation = observation_of_step(drive, t)
         rows, size, best = _step_on_network(rows, places, begin, end, observation, model, limits.beam_nats, scratch)
         rows, places = with_room(rows, size + MOST_OFF), with_room(places, place_count + MOST_OFF)

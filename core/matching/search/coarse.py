@@ -87,7 +87,7 @@ def _parts(coarse: SearchProblem, tried: CoarseStates, heading_rad: float) -> It
         yield hypotheses_in(coarse.graph, tried.bins[first : first + bins_at_once], tried.scale_bins, heading_rad)
 
 
-def _raise_floor(least_nats: FloatArray, best_nats: FloatArray, beam_nats: float, margin_nats: float) -> None:
+def _raise_floor(least_nats: FloatArray, best_nats: Float32Array | FloatArray, beam_nats: float, margin_nats: float) -> None:
     """Let what a part of the network scores at each sample prune the others, as if all were searched at once, in place."""
     own = slice(0, len(best_nats))
     least_nats[own] = np.maximum(least_nats[own], best_nats - beam_nats)
@@ -105,17 +105,10 @@ def _promising_bins(
     """
     least_nats, begun, nats = np.full(len(drive.heading_rad), NOWHERE), [], []
     for starts in _parts(coarse, tried, float(drive.heading_rad[0])):
-        initial = InitialHypotheses(starts, np.empty(0, PLACE))
-        survivors = forward_pass(drive, model, initial, config.coarse_beam_nats, _MOST_COARSE, least_nats=least_nats)
-        if not survivors.died_out:
-            score, row = survivors.hypotheses["score_nats"], np.arange(*survivors.row_start[-2:])
-            _raise_floor(
-                least_nats, np.maximum.reduceat(score, survivors.row_start[:-1]), config.coarse_beam_nats, config.seed_margin_nats
-            )
-            nats.append(score[row].copy())
-            for _ in range(len(survivors.row_start) - 2):
-                row = survivors.hypotheses["parent"][row]
-            begun.append(starts["bin"][row])
+        if (found := _begun_part(drive, model, starts, config, least_nats)) is not None:
+            _raise_floor(least_nats, found.best_nats, config.coarse_beam_nats, config.seed_margin_nats)
+            nats.append(found.nats)
+            begun.append(found.states)
     if not begun:
         return tried.bins
     rating = np.concatenate(nats)
@@ -138,9 +131,27 @@ def _are_near(points_m: FloatArray, places_m: FloatArray) -> BoolArray:
 class _Rated(NamedTuple):
     """The good ones among some initial states."""
 
-    states: IntArray  # (n,) their numbers
+    states: IntArray  # (n,) their numbers, or those of their bins
     nats: Float32Array  # (n,) score of the best route from each
-    best_nats: FloatArray  # (t,) best score at each sample, up to where the search ended
+    best_nats: Float32Array | FloatArray  # (t,) best score at each sample, up to where the search ended
+
+
+def _begun_part(
+    drive: Drive, model: SearchModel, starts: Hypotheses, config: RouteSearchConfig, least_nats: FloatArray
+) -> _Rated | None:
+    """The bins of the initial states from which the routes lead on that survive to the last sample; None if none survives.
+
+    The survivors, up to 200 MB, end with this function, before the next part is searched.
+    """
+    initial = InitialHypotheses(starts, np.empty(0, PLACE))
+    survivors = forward_pass(drive, model, initial, config.coarse_beam_nats, _MOST_COARSE, least_nats=least_nats)
+    if survivors.died_out:
+        return None
+    score, row = survivors.hypotheses["score_nats"], np.arange(*survivors.row_start[-2:])
+    nats, best_nats = score[row].copy(), np.maximum.reduceat(score, survivors.row_start[:-1])
+    for _ in range(len(survivors.row_start) - 2):
+        row = survivors.hypotheses["parent"][row]
+    return _Rated(starts["bin"][row], nats, best_nats)
 
 
 def _rated_part(

@@ -7,7 +7,6 @@ alignment", 1997. The answer is that of one search over the whole drive; a drive
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -72,12 +71,23 @@ def most_likely_route(
     """The most likely route from the initial hypotheses over the whole drive; None if no route of the network is as long."""
     drive = compiled_drive(problem, problem.track.heading_rad, place_prior)
     model = compiled_model(problem)
-    sections: list[_Section] = []
-    for section, survivors in _sections(drive, model, initial, config):
-        sections.append(section)
-        if section.last == len(drive.heading_rad) - 1:
-            return _backward_pass(problem, drive, model, sections, survivors, config)
-    return None
+    sections, survivors = _sections(drive, model, initial, config)
+    if survivors is None:
+        return None
+    last = last_survivors(survivors).hypotheses
+    end, onward = int(np.argmax(last["score_nats"])), np.zeros(len(last), np.float32)
+    cell, parts = _cells(problem), list[TracedRoute]()
+    for section in reversed(sections):
+        own = _samples(drive, section.first, section.last + 1)
+        if survivors is None:
+            survivors = forward_pass(own, model, section.initial, config.beam_nats, config.most_survivors)
+        through = backward(own, model, config.margin_nats, survivors, onward)
+        row = _trace_back(survivors, end)
+        thinned = alternatives(survivors, through, problem.graph.points_m, cell)
+        parts.append(_traced(problem, survivors, row, section.score_offset_nats, thinned))
+        end, onward = int(row[0]), _onward_nats(through, section.initial)
+        survivors = None  # up to 200 MB, which the section before needs anew
+    return _joined(parts[::-1])
 
 
 def best_nats(
@@ -89,32 +99,40 @@ def best_nats(
     as that is so.
     """
     drive, model = compiled_drive(problem, problem.track.heading_rad[first:]), compiled_model(problem)
-    least_nats = floor.from_sample(first)
-    for section, survivors in _sections(drive, model, initial, config, least_nats):
-        if section.last == len(drive.heading_rad) - 1:
-            return float(last_survivors(survivors).hypotheses["score_nats"].max()) + section.score_offset_nats
-    return NOWHERE
+    sections, survivors = _sections(drive, model, initial, config, floor.from_sample(first))
+    if survivors is None:
+        return NOWHERE
+    return float(last_survivors(survivors).hypotheses["score_nats"].max()) + sections[-1].score_offset_nats
 
 
 def _sections(
     drive: Drive, model: SearchModel, initial: InitialHypotheses, config: RouteSearchConfig, least_nats: FloatArray | None = None
-) -> Iterator[tuple[_Section, Survivors]]:
-    """The sections of the forward pass in driving order, each with its survivors, up to where no hypothesis is left."""
+) -> tuple[list[_Section], Survivors | None]:
+    """The sections of the forward pass in driving order, and the survivors of the last one; None if it does not reach the end
+    of the drive.
+
+    The survivors of a section are let go before the next one is searched: both together would be up to 400 MB.
+    """
     first, score_offset, samples = 0, 0.0, len(drive.heading_rad)
+    sections: list[_Section] = []
     while len(initial.hypotheses):
         survivors = forward_pass(
             _samples(drive, first, samples), model, initial, config.beam_nats, config.most_survivors,
             least_nats=None if least_nats is None else least_nats[first:] - score_offset,
         )  # fmt: skip
         last = first + len(survivors.row_start) - 2
-        yield _Section(first, last, initial, score_offset), survivors
-        if last == first or last == samples - 1:
-            return
+        sections.append(_Section(first, last, initial, score_offset))
+        if last == samples - 1:
+            return sections, survivors
+        if last == first:
+            break
         initial = last_survivors(survivors)
+        del survivors
         best = initial.hypotheses["score_nats"].max()
         best = best if best < -_EXACT_NATS else np.float32(0.0)
         initial.hypotheses["score_nats"] -= best
         first, score_offset = last, score_offset + float(best)
+    return sections, None
 
 
 def last_survivors(survivors: Survivors) -> InitialHypotheses:
@@ -132,34 +150,6 @@ def last_survivors(survivors: Survivors) -> InitialHypotheses:
 def _samples(drive: Drive, first: int, end: int) -> Drive:
     """The samples ``first:end`` of a drive."""
     return drive._replace(heading_rad=drive.heading_rad[first:end], place_prior=drive.place_prior[first:end])
-
-
-def _backward_pass(
-    problem: SearchProblem,
-    drive: Drive,
-    model: SearchModel,
-    sections: list[_Section],
-    survivors: Survivors,
-    config: RouteSearchConfig,
-) -> TracedRoute:
-    """Trace the best route and its alternatives back through the sections, from the last, whose ``survivors`` are given.
-
-    The survivors of every other section are computed again from its checkpoint.
-    """
-    cell = _cells(problem)
-    last = last_survivors(survivors).hypotheses
-    end, onward = int(np.argmax(last["score_nats"])), np.zeros(len(last), np.float32)
-    parts: list[TracedRoute] = []
-    for section in reversed(sections):
-        own = _samples(drive, section.first, section.last + 1)
-        if parts:
-            survivors = forward_pass(own, model, section.initial, config.beam_nats, config.most_survivors)
-        through = backward(own, model, config.margin_nats, survivors, onward)
-        row = _trace_back(survivors, end)
-        thinned = alternatives(survivors, through, problem.graph.points_m, cell)
-        parts.append(_traced(problem, survivors, row, section.score_offset_nats, thinned))
-        end, onward = int(row[0]), _onward_nats(through, section.initial)
-    return _joined(parts[::-1])
 
 
 def _onward_nats(through: Float32Array, initial: InitialHypotheses) -> Float32Array:

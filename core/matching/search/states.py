@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import mmap
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -12,6 +13,8 @@ from hippodrome.core.matching.search.model import SearchModel
 from hippodrome.core.matching.search.successors import MOST_SUCCESSORS
 from hippodrome.core.roads.lanes_ahead import WAYS
 from hippodrome.core.types import IntArray
+
+_MANY_STATES: Final = 1_000_000  # 4 MB, from which on NumPy asks for large pages
 
 
 class Scratch(NamedTuple):
@@ -27,8 +30,17 @@ def empty_states(model: SearchModel) -> IntArray:
     """The table of states (N * K,) without any hypothesis.
 
     The system gives memory to those pages only that are written to. A search touches few of the states of a large network.
+    NumPy would ask for pages of 2 MB, which are touched almost all; so the memory is not NumPy's own.
     """
-    return np.zeros(len(model.graph.lane) * len(model.scales), np.int32)
+    count = len(model.graph.lane) * len(model.scales)
+    if count < _MANY_STATES or not hasattr(mmap, "MAP_PRIVATE"):
+        return np.zeros(count, np.int32)
+    pages = mmap.mmap(-1, 4 * count, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    try:  # noqa: SIM105  # core imports numbers only
+        pages.madvise(mmap.MADV_NOHUGEPAGE)
+    except (AttributeError, OSError):  # a system without large pages does not know them
+        pass
+    return np.frombuffer(pages, np.int32)
 
 
 @njit(cache=True, error_model="numpy")

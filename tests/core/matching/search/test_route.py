@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hippodrome.core.matching.search import coarse
+from hippodrome.core.matching.search import coarse, states
 from hippodrome.core.matching.search import passes as search_passes
 from hippodrome.core.matching.search.config import RouteSearchConfig
 from hippodrome.core.matching.search.route import search_route
@@ -37,6 +37,14 @@ def test_alternatives_are_the_good_ones_and_the_best_is_among_them(town, drive):
     alternatives = search_route(drive[0], town, CONFIG).alternatives
     assert alternatives.through_nats.min() >= -CONFIG.margin_nats
     np.testing.assert_allclose(np.maximum.reduceat(alternatives.through_nats, alternatives.row_start[:-1]), 0.0, atol=1e-2)
+
+
+def test_a_large_table_of_states_changes_no_answer(town, drive, monkeypatch):
+    once = search_route(drive[0], town, CONFIG)
+    monkeypatch.setattr(states, "_MANY_STATES", 1)
+    again = search_route(drive[0], town, CONFIG)
+    np.testing.assert_array_equal(again.points_m, once.points_m)
+    np.testing.assert_array_equal(again.alternatives.through_nats, once.alternatives.through_nats)
 
 
 def test_a_drive_searched_in_sections_gives_the_same_answer(town, drive, monkeypatch):

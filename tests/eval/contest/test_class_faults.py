@@ -55,7 +55,7 @@ def test_a_method_that_maps_well_and_answers_nothing_keeps_its_errors(materials)
     ("name", "cause"),
     [
         ("Endless", "hung: no end after 3 s, its limit"),
-        ("Hungry", "MemoryError"),
+        ("Hungry", "more than its limit of 3000 MB"),
         ("Aborts", "crashed: signal 6 (SIGABRT)"),
     ],
 )

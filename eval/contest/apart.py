@@ -26,7 +26,8 @@ from hippodrome.eval.contest.declared import Declared
 from hippodrome.eval.contest.guard import Crashed
 from hippodrome.eval.contest.sources import method_sha256
 from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, MethodError
-from hippodrome.eval.programs.process import POLL_S, Limits, Process, started
+from hippodrome.eval.programs.limits import Limits
+from hippodrome.eval.programs.process import POLL_S, Process, started
 from hippodrome.eval.programs.references import search_here
 from hippodrome.sim.method_spec import MethodSpec
 

@@ -17,7 +17,8 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import HippodromeError, Observation
 from hippodrome.eval.contest.sources import method_sha256
 from hippodrome.eval.methods.protocol import MethodError
-from hippodrome.eval.programs.process import Limits, Process, command_words, started
+from hippodrome.eval.programs.limits import Limits
+from hippodrome.eval.programs.process import Process, command_words, started
 from hippodrome.eval.programs.stream import VERSION, Line, camera_message
 from hippodrome.proto import method_stream_pb2 as pb
 from hippodrome.proto.driving import command_of, lane_messages, observation_message, radar_message

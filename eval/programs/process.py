@@ -20,16 +20,11 @@ from hippodrome.eval.methods.protocol import MethodError
 from hippodrome.eval.programs.containment import DEPTH, can_contain, contained
 from hippodrome.eval.programs.disk import Disk
 from hippodrome.eval.programs.family import descendant, family, holds_pipe, peak_bytes, processes
+from hippodrome.eval.programs.limits import Limits, limit
 from hippodrome.eval.programs.references import printable
-from hippodrome.sim.method_spec import MethodSpec
 
-MEGABYTE: Final = 1_000_000
-# Address space over memory. Programs reserve much that they never touch: ORB-SLAM3 53 GB at once, late in a long drive, where
-# it holds 4 GB; runtimes with a heap of their own do so from their start. It is a backstop for what is taken between two looks.
-ADDRESS_SPACE: Final = 16
 POLL_S: Final = 0.05  # between two looks at a process: its memory is looked at as well
 FIRST_POLL_S: Final = 0.001  # between the first ones: what ends at once has its memory looked at, too
-FILE_BYTES: Final = 4 << 30  # the longest file that a program may write, its printed text included
 TEMPORARY: Final = "temporary"  # folder in its own one for files that it makes where TMPDIR says
 LAST_WORDS: Final = 300  # characters of what a program printed last that an error quotes
 LEAST_WORK: Final = 0.02  # share of a core: a program that uses less of one for longer than its limit has stalled
@@ -43,32 +38,6 @@ class ProgramEnded(MethodError):
     """A program that did not end well. ``own_fault``: it crashed or stalled, which another run of it need not."""
 
     own_fault = False
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What a program may take."""
-
-    time_s: float
-    memory_bytes: int  # that all its processes hold together
-    disk_bytes: int = 8_000 * MEGABYTE  # that it may keep on disk
-    stall_s: float | None = None  # how long it may do no work: its threads wait for one another, say; None: for ever
-
-    @classmethod
-    def of(cls, spec: MethodSpec) -> Limits:
-        """Those that a scenario sets for a method."""
-        memory_bytes, disk_bytes = (round(limit * MEGABYTE) for limit in (spec.memory_limit_mb, spec.disk_limit_mb))
-        return cls(spec.time_limit_s, memory_bytes, disk_bytes, spec.stall_limit_s)
-
-    @property
-    def address_bytes(self) -> int:
-        """The address space that each of its processes may reserve."""
-        return ADDRESS_SPACE * self.memory_bytes
-
-    @property
-    def file_bytes(self) -> int:
-        """The longest file that it may write."""
-        return min(FILE_BYTES, self.disk_bytes)
 
 
 @dataclass(slots=True)
@@ -241,7 +210,7 @@ def started(
             cure = "does it begin with #! and its interpreter?"
             raise MethodError(f"'{command[0]}' cannot be started: {error.strerror}; {cure}") from None
     if not within:
-        _limit(popen.pid, limits)
+        limit(popen.pid, limits)
     process = Process(popen, limits, log, disk, contained=within)
     process.look()
     try:
@@ -289,14 +258,6 @@ def last_words(log: Path) -> str:
 def _unblocked(path: Path, flags: int = os.O_RDONLY) -> int:
     """Open a file without following a link or waiting for its other end: a program may have put anything there."""
     return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600)
-
-
-def _limit(pid: int, limits: Limits) -> None:
-    """Limits of the system for a process that has just begun; it and its children keep them."""
-    with contextlib.suppress(ProcessLookupError, PermissionError, ValueError):
-        resource.prlimit(pid, resource.RLIMIT_AS, (limits.address_bytes, limits.address_bytes))
-        resource.prlimit(pid, resource.RLIMIT_FSIZE, (limits.file_bytes, limits.file_bytes))
-        resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0))
 
 
 def _signal_name(number: int) -> str:

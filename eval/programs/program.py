@@ -14,7 +14,8 @@ from hippodrome.eval.methods.protocol import Answer, Cost, Given, Localized, Map
 from hippodrome.eval.programs.camera_poses import read_camera_tum
 from hippodrome.eval.programs.environments import words_of
 from hippodrome.eval.programs.layouts import write_sequence
-from hippodrome.eval.programs.process import Limits, Process, last_words, started
+from hippodrome.eval.programs.limits import Limits
+from hippodrome.eval.programs.process import Process, last_words, started
 from hippodrome.sim.method_spec import MethodSpec
 
 TRAJECTORY: Final = "trajectory.tum"  # that a program leaves in its folder {out}

@@ -19,7 +19,8 @@ from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import Observation, Trajectory
 from hippodrome.eval.methods.protocol import Answer, Cost, Given, Localized, Mapped, MethodError, StereoObservation
 from hippodrome.eval.programs.environments import words_of
-from hippodrome.eval.programs.process import POLL_S, Limits, Process, last_words, started
+from hippodrome.eval.programs.limits import Limits
+from hippodrome.eval.programs.process import POLL_S, Process, last_words, started
 from hippodrome.proto import method_stream_pb2 as pb
 from hippodrome.proto.driving import observation_message
 from hippodrome.sim.method_spec import MethodSpec

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-import hippodrome.eval.programs.process
+import hippodrome.eval.programs.limits
 from hippodrome.eval.contest.entry import Added, entries_of, with_methods
 from hippodrome.eval.contest.perform import perform
 from hippodrome.eval.programs.containment import can_contain
@@ -158,7 +158,7 @@ def test_a_program_that_fills_the_disk_is_stopped_and_the_limit_named(row, text)
 
 
 def test_no_file_is_longer_than_the_limit(row, monkeypatch):
-    monkeypatch.setattr(hippodrome.eval.programs.process, "FILE_BYTES", 20_000_000)
+    monkeypatch.setattr(hippodrome.eval.programs.limits, "FILE_BYTES", 20_000_000)
     text = "#!/bin/sh\nexec head -c 40000000 /dev/zero > $2/a\n"
     assert "wrote a file of more than 20 MB, the limit" in row(text).failure
 

@@ -19,24 +19,19 @@ DONE, BAD_INPUT = 0, 2
 MAGIC = b"\x89MCAP0\r\n"
 
 
-def text(name, change):
-    """A change of a text file in a folder, which hits something."""
-
-    def changed(folder):
-        before = (folder / name).read_text()
-        (folder / name).write_text(after := change(before))
-        assert after != before
-
-    return changed
-
-
 def binary(name, change):
+    """A change of a file in a folder, which hits something."""
+
     def changed(folder):
         before = (folder / name).read_bytes()
         (folder / name).write_bytes(after := change(before))
         assert after != before
 
     return changed
+
+
+def text(name, change):
+    return binary(name, lambda content: change(content.decode()).encode())
 
 
 def sql(words):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,13 +12,11 @@ import numpy as np
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, Frame, IntArray
 from hippodrome.eval.authoring.network_notes import network_notes
-from hippodrome.eval.figures.frames import draw_contact_sheet
-from hippodrome.eval.figures.preview import draw_preview
 from hippodrome.eval.pool import Workers, worker_pool
 from hippodrome.sim.episode import Samples, draw_frame
 from hippodrome.sim.network import edge_lengths_m
 from hippodrome.sim.record import ROLES, RecordingPlan, Role, simulate
-from hippodrome.sim.render.probe import require_gl
+from hippodrome.sim.render.probe import gl_tried_beside
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.scene.build import build_scene
 from hippodrome.sim.types import Drive, Town
@@ -52,25 +51,53 @@ class Preview:
         return [*self.town_notes, *([few] if self.mapped_share < LITTLE_OVERLAP else [])]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """A drive, what is sensed on it, and what the camera sees here and there."""
+
+    drive: Drive
+    samples: Samples
+    frames: list[Frame]
+    captions: list[str]
+
+
 def preview_scenario(scenario: Scenario, out: Path) -> Preview:
-    """Simulate both drives, and draw ``overview.png`` and ``stills.png`` into ``out``. Raises HippodromeError."""
-    require_gl()
-    plans = {role: RecordingPlan(scenario, role, out) for role in ROLES}
-    with _workers(scenario) as pool:
-        town, results = _town_and_drives(scenario, list(plans.values()), pool)
-        simulated = dict(zip(plans, results, strict=True))
-        drives = {role: drive for role, (drive, _) in simulated.items()}
-        samples = {role: sampled for role, (_, sampled) in simulated.items()}
-        views = [(plan, town, drives[role], samples[role]) for role, plan in plans.items()]
-        drawn = [_stills(view) for view in views] if pool is None else pool.run("draw", _stills, views)
+    """Simulate both drives, and draw ``overview.png`` and ``stills.png`` into ``out``. Raises HippodromeError.
+
+    Whether OpenGL works is tried while the town is read; where both fail, what is wrong with the network is said.
+    """
+    plans = [RecordingPlan(scenario, role, out) for role in ROLES]
+    with gl_tried_beside() as require_gl, _workers(scenario) as pool, ThreadPoolExecutor(1) as helper:
+        if pool is None:
+            helper.submit(_load_figures)
+            town = plans[0].town()
+            simulated = [simulate(plan, town) for plan in plans]
+            require_gl()
+            shown = [_with_stills(plan, town, *result) for plan, result in zip(plans, simulated, strict=True)]
+        else:
+            for _ in plans:
+                pool.executor.submit(_load)  # what the processes need, while the town is read
+            town, network = plans[0].town(), str(scenario.town.network)
+            require_gl()
+            helper.submit(_load_figures)
+            tasks = [(plan, town) for plan in plans]
+            shown = pool.run("simulate and draw", _simulate_and_draw, tasks, place=lambda _: network)
+    return _drawn(scenario, town, dict(zip(ROLES, shown, strict=True)), out)
+
+
+def _drawn(scenario: Scenario, town: Town, shown: dict[Role, _Shown], out: Path) -> Preview:
+    """Draw both pictures."""
+    from hippodrome.eval.figures.frames import draw_contact_sheet  # see _load_figures
+    from hippodrome.eval.figures.preview import draw_preview
+
+    drives = {role: one.drive for role, one in shown.items()}
     mapping, second = drives["mapping"], drives["localization"]
-    notes = network_notes(scenario, town)
-    preview = Preview(town, drives, samples, notes, mapped_share(town.network, mapping, second))
     draw_preview(out / "overview.png", town.network, mapping.poses_m, visits_of_road(town.network, mapping.lane),
                  second.poses_m, f"{scenario.name}: the two drives")  # fmt: skip
-    frames, captions = ([one for row in part for one in row] for part in zip(*drawn, strict=True))
+    frames, captions = ([one for part in shown.values() for one in getattr(part, name)] for name in ("frames", "captions"))
     draw_contact_sheet(out / "stills.png", frames, captions, title=f"{scenario.name}: stills of the mapping and the second drive")
-    return preview
+    samples = {role: one.samples for role, one in shown.items()}
+    return Preview(town, drives, samples, network_notes(scenario, town), mapped_share(town.network, mapping, second))
 
 
 def _workers(scenario: Scenario) -> AbstractContextManager[Workers | None]:
@@ -78,25 +105,21 @@ def _workers(scenario: Scenario) -> AbstractContextManager[Workers | None]:
     return nullcontext() if scenario.town.network is None else worker_pool(len(ROLES))
 
 
-def _town_and_drives(
-    scenario: Scenario, plans: list[RecordingPlan], pool: Workers | None
-) -> tuple[Town, list[tuple[Drive, Samples]]]:
-    """The town, and the drives. The processes load what they need while the town is read."""
-    if pool is None:
-        town = plans[0].town()
-        return town, [simulate(plan, town) for plan in plans]
-    for _ in plans:
-        pool.executor.submit(_load)
-    town, network = plans[0].town(), str(scenario.town.network)
-    return town, pool.run("simulate", _simulate, [(plan, town) for plan in plans], place=lambda _: network)
-
-
 def _load() -> None:
-    import hippodrome.sim.ego  # noqa: F401  # takes seconds
+    import hippodrome.sim.ego
+    import hippodrome.sim.render.renderer  # noqa: F401  # both take a second
 
 
-def _simulate(task: tuple[RecordingPlan, Town]) -> tuple[Drive, Samples]:
-    return simulate(*task)
+def _load_figures() -> None:
+    """Matplotlib takes a second to load, and is needed at the end only; the processes of the drives never need it."""
+    import hippodrome.eval.figures.frames
+    import hippodrome.eval.figures.preview  # noqa: F401
+
+
+def _simulate_and_draw(task: tuple[RecordingPlan, Town]) -> _Shown:
+    """One task and not two: the shorter drive need not wait for the longer one, nor the town be sent again."""
+    plan, town = task
+    return _with_stills(plan, town, *simulate(plan, town))
 
 
 def visits_of_road(network: RoadNetwork, lane: IntArray) -> IntArray:
@@ -114,11 +137,10 @@ def mapped_share(network: RoadNetwork, mapping: Drive, second: Drive) -> float:
     return float(lengths_m[np.intersect1d(known, wanted)].sum() / lengths_m[wanted].sum())
 
 
-def _stills(view: tuple[RecordingPlan, Town, Drive, Samples]) -> tuple[list[Frame], list[str]]:
+def _with_stills(plan: RecordingPlan, town: Town, drive: Drive, samples: Samples) -> _Shown:
     """``STILLS`` frames of a drive, spread evenly over it, and their captions."""
     from hippodrome.sim.render.renderer import FrameRenderer  # after require_gl, which names what is missing
 
-    plan, town, drive, samples = view
     conditions, camera = plan.drive_spec.conditions, plan.scenario.camera
     numbers = np.linspace(0, len(samples.frame_steps) - 1, 2 * STILLS + 1).astype(int)[1::2]  # not where a drive begins
     views_m = samples.poses_m[samples.frame_steps[numbers]]
@@ -126,7 +148,8 @@ def _stills(view: tuple[RecordingPlan, Town, Drive, Samples]) -> tuple[list[Fram
     scene = build_scene(town, plan.scenario.seed, conditions, views_m, half_view_rad)  # of a large town only what they show
     with FrameRenderer(scene, camera) as renderer:
         frames = [draw_frame(renderer, drive, samples, number, conditions, plan.seed)[0] for number in numbers.tolist()]
-    return frames, [f"{plan.role}, {samples.t_s[samples.frame_steps[number]]:.0f} s" for number in numbers]
+    captions = [f"{plan.role}, {samples.t_s[samples.frame_steps[number]]:.0f} s" for number in numbers]
+    return _Shown(drive, samples, frames, captions)
 
 
 def _town_line(town: Town) -> str:

@@ -11,7 +11,8 @@ import os
 import shutil
 import subprocess
 import sys
-from functools import cache
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
 from hippodrome._processes import dying_with_me
@@ -22,6 +23,7 @@ LIBRARIES: Final = {"libEGL.so.1": "libegl1", "libGL.so.1": "libgl1"}
 DRIVER_PACKAGES: Final = ("libegl-mesa0", "libgl1-mesa-dri")
 TIMEOUT_S: Final = 120.0  # a first import from a cold disk takes seconds; a driver that hangs must not hang us
 DRAWN: Final = "drawn by "
+TRIAL: Final = (sys.executable, "-m", "hippodrome.sim.render.probe", "--draw")
 
 
 def draw() -> str:
@@ -41,17 +43,32 @@ def draw() -> str:
 
 def probe() -> tuple[bool, str]:
     """Whether a frame can be drawn, tried in a process of its own, and one line: the driver, or what is missing."""
-    command = [sys.executable, "-m", "hippodrome.sim.render.probe", "--draw"]
+    with _trial() as child:
+        return _answer(child)
+
+
+@contextmanager
+def _trial() -> Iterator[subprocess.Popen[str]]:
+    """A process that draws one frame; it ends with the block at the latest."""
+    with subprocess.Popen(
+        TRIAL, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=dying_with_me()
+    ) as child:
+        try:
+            yield child
+        finally:
+            child.kill()  # nothing happens to one that has ended
+
+
+def _answer(child: subprocess.Popen[str]) -> tuple[bool, str]:
+    """What came of a trial, which is waited for."""
     try:
-        child = subprocess.run(
-            command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False, preexec_fn=dying_with_me()
-        )
+        out, complaint = child.communicate(timeout=TIMEOUT_S)
     except subprocess.TimeoutExpired:
         return False, f"OpenGL does not answer within {TIMEOUT_S:.0f} s; check the graphics driver"
-    answer = [line.removeprefix(DRAWN) for line in child.stdout.splitlines() if line.startswith(DRAWN)]
+    answer = [line.removeprefix(DRAWN) for line in out.splitlines() if line.startswith(DRAWN)]
     if child.returncode == 0 and answer:
         return True, answer[-1]
-    reason = (child.stderr.strip().splitlines() or [f"exit status {child.returncode}"])[-1]
+    reason = (complaint.strip().splitlines() or [f"exit status {child.returncode}"])[-1]
     return False, f"no off-screen OpenGL: {advice()} ({reason})"
 
 
@@ -89,12 +106,33 @@ def install() -> bool:
     return subprocess.run(command, env=quiet, stdout=subprocess.DEVNULL, check=False).returncode == 0
 
 
-@cache
+_drivers: list[str] = []  # the one by which a frame was drawn; another process need not try it again
+
+
 def require_gl() -> str:
-    """The driver's name, or ``HippodromeError`` with the cure. Tried once per process."""
-    works, line = probe()
+    """The driver's name, or ``HippodromeError`` with the cure. Tried until it has worked once in this process."""
+    with gl_tried_beside() as required:
+        return required()
+
+
+@contextmanager
+def gl_tried_beside() -> Iterator[Callable[[], str]]:
+    """``require_gl`` for the block, with the trial begun already: it goes on beside what the block does before it asks.
+
+    Where the block fails, or never asks, the trial ends with it, and nothing is said of OpenGL.
+    """
+    if _drivers:
+        yield lambda: _drivers[0]
+        return
+    with _trial() as child:
+        yield lambda: _drivers[0] if _drivers else _driver(_answer(child))
+
+
+def _driver(found: tuple[bool, str]) -> str:
+    works, line = found
     if not works:
         raise HippodromeError(line)
+    _drivers.append(line)
     return line
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a value of a scenario, in words for its author: pydantic speaks of tuples, dictionaries and patterns."""
+"""Which values of a file a model refuses: each with its place, in words for the file's author, and the key that may be meant."""
 
 from __future__ import annotations
 
@@ -9,45 +9,21 @@ from typing import Any, Final
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-# Patterns of texts, in regular expressions and in words.
-SCENARIO_NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
-METHOD_NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39}$"
-CLASS: Final = r"^[\w.]+:[\w.]+$"
-POLICY: Final = r"(exec|stream):.*\S.*|[\w.]+:[\w.]+"  # a command that is fed step by step, or a Python object
-SOURCE: Final = f"^({POLICY})$"
-NEED: Final = r"^(road_network|start_pose|stereo|grain|metric_scale|[1-9][0-9]{1,3}x[1-9][0-9]{1,3})$"
-PATTERNS: Final = {
-    SCENARIO_NAME: "results are filed under it: letters, digits, '.', '_', '-', at most 64",
-    METHOD_NAME: "a name begins with a letter or digit and has letters, digits, spaces and . _ + ( ) , - , at most 40",
-    CLASS: "Input should be my_package.my_module:MyClass, or exec: or stream: and a command",
-    SOURCE: "Input should be my_package.my_module:MyPolicy, or exec: or stream: and a command",
-    NEED: "Input should be road_network, start_pose, stereo, grain, metric_scale, or a size like 640x480",
-}
+from hippodrome._output import one_line
+from hippodrome.sim.key_names import names_at, path_meant
+from hippodrome.sim.spec import Spec
+from hippodrome.sim.value_words import LONGEST, MODEL_TYPES, MUST_BE, UNKNOWN_KEY, not_given, wanted_of, words_of
 
-OWN_KEYS: Final = "takes keys of its own; docs/scenarios.md lists them"
-# What a key wants, by pydantic's names of errors; for the others see ``_wanted``.
-WANTED: Final = {
-    "tuple_type": "a list, as in [a, b]",
-    "list_type": "a list, as in [a, b]",
-    "dict_type": "names with values, as in {a: b}",
-    "model_type": "keys of its own (docs/scenarios.md lists them)",
-    "dataclass_type": "keys of its own (docs/scenarios.md lists them)",
-    "string_type": "text, in quotes where it looks like a number or a word like yes",
-    "path_type": "the path of a file, in quotes where it looks like a number or a word like yes",
-    "bool_type": "true or false",
-    "bool_parsing": "true or false",
-}
-UNKNOWN_KEY: Final = ("extra_forbidden", "unexpected_keyword_argument")  # pydantic's names, of models and of dataclasses
-MODEL_TYPES: Final = ("model_type", "dataclass_type")  # the same for a plain value where keys are wanted
 PLAIN_KINDS: Final = ("str", "int", "float", "bool", "path", "list", "dict")  # kinds that look like names of keys
 OF_A_KEY: Final = "[key]"  # pydantic's name for the name of an entry, where it is that which is wrong
-LONGEST: Final = 60  # characters of a value that an error repeats
-LARGEST_PRINTED: Final = 10**LONGEST
+KEYS_NAMED: Final = 12  # keys that an error names, of a model that has more
+KEYS_SHOWN: Final = 3  # keys that it names where a plain value was given: they show what is meant
+REFERENCE: Final = "docs/scenarios.md lists all"
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One value of a scenario that is refused."""
+    """One value of a file that is refused."""
 
     location: tuple[int | str, ...]  # its place in the file, from the outermost key
     kind: str  # pydantic's name of the error
@@ -55,65 +31,80 @@ class Fault:
     given: Any  # the value
 
 
-def faults_of(error: ValidationError, data: Any) -> list[Fault]:
-    """Each value of ``data`` that a model refused, once. A key that takes values of several kinds names all of them."""
+def place_of(location: Sequence[int | str]) -> str:
+    """A place in a file as people write it, ``mapping.tour.length_m``, in one line whatever the keys are."""
+    return ".".join(one_line(str(part))[:LONGEST] or "''" for part in location)
+
+
+def first_fault(error: ValidationError, data: Any, model: Any = None, top: str = "top level") -> str:
+    """The place of the first value that a model refused, what is wrong with it, and how many others there are: in one line.
+
+    Args:
+        error: What was raised.
+        data: What was read.
+        model: The model that refused it, if an unknown key is to be answered with those that there are.
+        top: What stands for the place of the whole.
+    """
+    first, *others = faults_of(error, data, model)
+    more = f" (and {len(others)} more)" if others else ""
+    return f"{place_of(first.location) or top}: {first.words}{more}"
+
+
+def faults_of(error: ValidationError, data: Any, model: Any = None) -> list[Fault]:
+    """Each value of ``data`` that ``model`` refused, once. A key that takes values of several kinds names all of them.
+
+    ``model``, where it is known, adds to an unknown key which one may be meant, and to a plain value which keys are wanted.
+    """
     apart: dict[tuple[int | str, ...], list[tuple[ErrorDetails, tuple[int | str, ...]]]] = {}
     for number, one in enumerate(error.errors(include_url=False)):
         location, choice = _placed(one["loc"], data)
         apart.setdefault((number,) if choice is None else (*location[:choice], OF_A_KEY), []).append((one, location))
-    return [fault for group in apart.values() for fault in _faults_of_group(group)]
+    return [fault for group in apart.values() for fault in _faults_of_group(group, model)]
 
 
-def _faults_of_group(group: list[tuple[ErrorDetails, tuple[int | str, ...]]]) -> Iterator[Fault]:
+def _faults_of_group(group: list[tuple[ErrorDetails, tuple[int | str, ...]]], model: Any) -> Iterator[Fault]:
     """The faults of one value: of several kinds that it might be, those of the one whose shape it has, or one that names all."""
     shallow = min(len(location) for _, location in group)
     inner = [(one, location) for one, location in group if len(location) > shallow]
     if len(group) == 1 or inner:
         for one, location in inner or group:
-            yield Fault(location, one["type"], words_of(one), one.get("input"))
+            yield Fault(location, one["type"], _words(one, location, model), one.get("input"))
     else:
         first, location = group[0]
-        wanted = ", or ".join(dict.fromkeys(_wanted(one) for one, _ in group))
-        yield Fault(location, first["type"], f"Input should be {wanted}{_not(first)}", first.get("input"))
+        wanted = ", or ".join(dict.fromkeys(f"{wanted_of(one)}{_keys_of(one, location, model)}" for one, _ in group))
+        yield Fault(location, first["type"], f"{MUST_BE}{wanted}{not_given(first)}", first.get("input"))
 
 
-def words_of(one: ErrorDetails) -> str:
-    """What is wrong with one value, in a sentence without the name of its key."""
-    kind, context = one["type"], one.get("ctx", {})
-    if kind in UNKNOWN_KEY:
-        return "unknown key; see the scenario reference in docs/scenarios.md"
-    if kind in MODEL_TYPES:
-        return OWN_KEYS
-    if kind == "string_pattern_mismatch" and context.get("pattern") in PATTERNS:
-        return f"{PATTERNS[context['pattern']]}{_not(one)}"
-    if kind in WANTED:
-        return f"Input should be {WANTED[kind]}{_not(one)}"
-    message = one["msg"].removeprefix("Value error, ").partition(", unable to parse")[0]
-    return f"{message}{_not(one)}" if "Input should" in message else message
+def _words(one: ErrorDetails, location: Sequence[int | str], model: Any) -> str:
+    """What is wrong with one value, with the keys that there are where they are the matter."""
+    if one["type"] in UNKNOWN_KEY:
+        return unknown_words(location, model)
+    if one["type"] in MODEL_TYPES:
+        return f"takes keys of its own{_keys_of(one, location, model)}{not_given(one)}"
+    return words_of(one)
 
 
-def _wanted(one: ErrorDetails) -> str:
-    """What one of several kinds of values would be."""
-    kind, context = one["type"], one.get("ctx", {})
-    if kind in WANTED:
-        return WANTED[kind]
-    if kind.startswith("int_"):
-        return "a whole number"
-    if kind.startswith("float_") or kind == "finite_number":
-        return "a number"
-    bounds = {"ge": "of at least", "gt": "above", "le": "of at most", "lt": "below"}
-    named = next((f"a number {words} {context[name]:g}" for name, words in bounds.items() if name in context), None)
-    return named or words_of({**one, "input": None}).removeprefix("Input should be ")
+def unknown_words(location: Sequence[int | str], model: Any) -> str:
+    """That a key is unknown, and the cure: the key that may be meant, or those that there are."""
+    meant = path_meant(model, location)
+    if meant is not None:
+        return f"unknown key; did you mean {place_of(meant)}?"
+    names = names_at(model, location[:-1])
+    return f"unknown key; take it out{f'; there are {_listed(names, model)}' if names else ''}"
 
 
-def _not(one: ErrorDetails) -> str:
-    """What was given, where that is one value: ``, not 5``."""
-    given = one.get("input")
-    if isinstance(given, bool):
-        return f", not {str(given).lower()}"
-    if isinstance(given, int) and abs(given) > LARGEST_PRINTED:  # Python refuses to print what has thousands of digits
-        return ""
-    return f", not {repr(given)[:LONGEST]}" if isinstance(given, str | int | float) else ""
+def _keys_of(one: ErrorDetails, location: Sequence[int | str], model: Any) -> str:
+    """The keys that a value would have that has to have some, in brackets; empty where they are not known."""
+    names = names_at(model, location) if one["type"] in MODEL_TYPES else []
+    return f" ({', '.join([*names[:KEYS_SHOWN], '...'] if len(names) > KEYS_SHOWN else names)})" if names else ""
+
+
+def _listed(names: Sequence[str], model: Any) -> str:
+    """Names of keys, in one line that can be read."""
+    if len(names) <= KEYS_NAMED:
+        return ", ".join(names)
+    more = REFERENCE if isinstance(model, type) and issubclass(model, Spec) else f"{len(names) - KEYS_NAMED} more"
+    return f"{', '.join(names[:KEYS_NAMED])}; {more}"
 
 
 def _placed(location: Sequence[int | str], data: Any) -> tuple[tuple[int | str, ...], int | None]:

@@ -70,13 +70,13 @@ def refuse_truth_values(schema: CoreSchema, resolve: Callable[[Any], Any]) -> No
 
 def _no_truth_value(given: Any) -> Any:
     if isinstance(given, bool):
-        raise PydanticCustomError("float_type", "Input should be a valid number")
+        raise PydanticCustomError("float_type", "must be a number")
     return given
 
 
 def _no_truth_value_but_whole(given: Any) -> Any:
     if isinstance(given, bool):
-        raise PydanticCustomError("int_type", "Input should be a valid integer")
+        raise PydanticCustomError("int_type", "must be a whole number")
     return given
 
 

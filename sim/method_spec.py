@@ -8,8 +8,8 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_serializer, model_validator
 
-from hippodrome.sim.key_words import CLASS, NEED
 from hippodrome.sim.spec import Spec
+from hippodrome.sim.value_words import CLASS, NEED
 
 Layout = Literal["tum", "euroc", "kitti", "rosbag2", "mcap"]
 STEREO_LAYOUTS: Final = ("euroc", "kitti")  # those that have a place for the right image
@@ -39,7 +39,7 @@ class MethodSpec(Spec):
     def _short_form(cls, data: Any) -> Any:
         """A text alone is ``exec:COMMAND``, ``stream:COMMAND``, or a class."""
         if isinstance(data, int | float | list):
-            raise ValueError("Input should be my_package.my_module:MyClass, exec: or stream: and a command, or keys of its own")
+            raise ValueError("must be my_package.my_module:MyClass, exec: or stream: and a command, or keys of its own")
         if not isinstance(data, str):
             return data
         kind, _, rest = data.partition(":")

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from hippodrome.sim.key_words import METHOD_NAME, SOURCE
 from hippodrome.sim.spec import Spec
+from hippodrome.sim.value_words import METHOD_NAME, SOURCE
 
 RowKey = Literal["ours", "truth", "dead-reckoning", "no-reading", "on-sight", "paper", "kalman"]
 PolicyName = Annotated[str, Field(pattern=METHOD_NAME)]

@@ -11,7 +11,6 @@ from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.mapping.config import MapperConfig
 from hippodrome.core.refinement.config import RefineConfig
 from hippodrome.sim.ego_spec import EgoSpec
-from hippodrome.sim.key_words import METHOD_NAME, SCENARIO_NAME
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.mission_spec import MissionLimits, MissionSpec
 from hippodrome.sim.renamed import with_present_names
@@ -22,6 +21,7 @@ from hippodrome.sim.spec import Spec
 from hippodrome.sim.tour_spec import TourSpec
 from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.traffic_spec import TrafficSpec
+from hippodrome.sim.value_words import METHOD_NAME, SCENARIO_NAME
 from hippodrome.sim.yaml_file import load_yaml
 
 ClosedCount = Annotated[int, Field(ge=0, le=100)]

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from hippodrome._files import read_bounded
 from hippodrome.core.types import HippodromeError
-from hippodrome.sim.key_words import faults_of
+from hippodrome.sim.key_words import faults_of, place_of
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 MAX_BYTES = 1 << 20  # a scenario is a page; more is a mistake or an attack
@@ -34,10 +34,10 @@ def load_yaml(path: Path, model: type[ModelT]) -> ModelT:
     try:
         return as_model(path, data, model)
     except ValidationError as error:
-        first, *others = faults_of(error, data)
-        place = ".".join(map(str, first.location))
-        more = f" (and {len(others)} more)" if others else ""
-        raise ScenarioError(f"{path}:{_line(root, first.location)}: {place}: {first.words}{more}") from None
+        first, *others = faults_of(error, data, model)
+        place = f"{place_of(first.location)}: " if first.location else ""
+        more = f" (and {len(others)} more: `hippodrome scenario validate` lists all)" if others else ""
+        raise ScenarioError(f"{path}:{_line(root, first.location)}: {place}{first.words}{more}") from None
 
 
 def as_model(path: Path, data: Any, model: type[ModelT]) -> ModelT:

@@ -59,7 +59,7 @@ REFUSED = [
     ("reli/yaml-bool-tag.yaml", "eval {0} --out {1}", "no bool"),
     ("reli/yaml-float-tag.yaml", "eval {0} --out {1}", "no float"),
     ("reli/yaml-ts-tag.yaml", "eval {0} --out {1}", "no timestamp"),
-    ("reli/nanbin.yaml", "eval {0} --out {1}", "bin_m: Input should be a finite number"),
+    ("reli/nanbin.yaml", "eval {0} --out {1}", "bin_m: must be a finite number"),
     ("reli/results-int5000.json", "compare {0} {0}", "not a readable results file"),
     ("reli/results-int5000.json", "report {0}", "not a readable results file"),
     ("reli/baseline-int5000.json", "gate --power --baseline {0}", "not a readable baseline"),

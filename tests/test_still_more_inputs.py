@@ -124,7 +124,7 @@ FIELDS = {
     "nan": (
         lambda row: row["figures"]["APE mean (m)"].update(value=float("nan")),
         BAD_INPUT,
-        "APE mean .m.*Input should be a finite number",
+        "APE mean .m.*must be a finite number",
     ),
     "no-figures": (lambda row: row.update(figures={}), BAD_INPUT, "has no APE mean"),
     "a-figure-below-zero": (
@@ -139,8 +139,8 @@ FIELDS = {
         BAD_INPUT,
         r"is 1e\+308, which no error is",
     ),
-    "words-for-a-seed": (lambda row: row.update(seed="three"), BAD_INPUT, "seed: Input should be a valid integer"),
-    "a-seed-of-a-half": (lambda row: row.update(seed=0.5), BAD_INPUT, "seed: Input should be a valid integer"),
+    "words-for-a-seed": (lambda row: row.update(seed="three"), BAD_INPUT, "seed: must be a whole number"),
+    "a-seed-of-a-half": (lambda row: row.update(seed=0.5), BAD_INPUT, "seed: must be a whole number"),
     "a-key-of-nobody": (lambda row: row.update(nobody=1), BAD_INPUT, "nobody: Extra inputs"),
     "a-method-of-terminal-commands": (lambda row: row.update(method="\x1b]0;x\x07[red]"), DONE, "no worse"),
 }

@@ -19,7 +19,6 @@ from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.network_notes import network_notes
 from hippodrome.eval.files.scenarios import PACKAGE, located
 from hippodrome.sim.driving_side import Choice
-from hippodrome.sim.key_words import SCENARIO_NAME
 from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
 from hippodrome.sim.net_cut import Around, cut_network, import_options
 from hippodrome.sim.scenario import Scenario
@@ -27,6 +26,7 @@ from hippodrome.sim.tour import tour_graph
 from hippodrome.sim.town import build_town
 from hippodrome.sim.town_spec import TownSpec
 from hippodrome.sim.types import Town
+from hippodrome.sim.value_words import SCENARIO_NAME
 from hippodrome.sim.yaml_file import ScenarioError, load_yaml
 
 KINDS: Final = ("rural", "grid", "radial", "random")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import yaml
 from pydantic import ValidationError
 
-from hippodrome.eval.authoring.keys import key_paths
-from hippodrome.sim.key_words import UNKNOWN_KEY, Fault, faults_of
+from hippodrome.sim.key_words import Fault, faults_of, place_of
 from hippodrome.sim.scenario import Scenario
-from hippodrome.sim.self_motion import SelfMotionNoise
+from hippodrome.sim.value_words import MISSING
 from hippodrome.sim.yaml_file import ScenarioError, as_model, parse_yaml, read_yaml, repeated_keys
 
 
@@ -25,7 +23,7 @@ def file_errors(path: Path) -> tuple[str, ...]:
     except ScenarioError as error:  # unreadable, or no YAML: there is no second error to find
         return (str(error),)
     except ValidationError as error:
-        found += _invalid(root, faults_of(error, data))
+        found += _invalid(root, faults_of(error, data, Scenario))
     found = sorted(dict.fromkeys(found), key=lambda one: one[0])
     return tuple(f"{path}:{line}: {words}" for line, words in found)
 
@@ -34,26 +32,11 @@ def _invalid(root: yaml.Node | None, faults: Iterable[Fault]) -> Iterator[tuple[
     """Line and words of what the model refuses."""
     for fault in faults:
         line, place, node = _find(root, fault.location)
-        if fault.kind == "missing":
+        if fault.kind in MISSING:
             place = f"{place}.{fault.location[-1]}".removeprefix(".")
         elif isinstance(node, yaml.MappingNode) and isinstance(fault.given, int | float):
             place = f"{place}: {fault.location[-1]}"  # a key that stands in the file below an earlier name
-        yield line, f"{place}: {_reason(fault, place)}".removeprefix(": ")
-
-
-def _reason(fault: Fault, place: str) -> str:
-    """What is wrong with the value at ``place``; of an unknown key, which one may be meant."""
-    if fault.kind in UNKNOWN_KEY:
-        near = difflib.get_close_matches(place, _known(place), n=1, cutoff=0.6)
-        return f"unknown key; {f'did you mean {near[0]}?' if near else 'docs/scenarios.md lists all'}"
-    return "must be given" if fault.kind == "missing" else fault.words
-
-
-def _known(place: str) -> list[str]:
-    """All keys of the same depth as the unknown one, whether they hold a value or further keys."""
-    depth = place.count(".") + 1
-    paths = (*key_paths(Scenario), *(("noise", *path) for path in key_paths(SelfMotionNoise)))
-    return sorted({".".join(path[:depth]) for path in paths if len(path) >= depth})
+        yield line, f"{place}: {fault.words}".removeprefix(": ")
 
 
 def _find(node: yaml.Node | None, location: Sequence[int | str]) -> tuple[int, str, yaml.Node | None]:
@@ -67,7 +50,7 @@ def _find(node: yaml.Node | None, location: Sequence[int | str]) -> tuple[int, s
             pair = next((pair for pair in reversed(node.value) if pair[0].value == str(part)), None)
             if pair is not None:
                 line, node = pair[0].start_mark.line + 1, pair[1]
-                path.append(str(part))
+                path.append(place_of([part]))
         elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
             node = node.value[part]
             line = node.start_mark.line + 1

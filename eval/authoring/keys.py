@@ -49,12 +49,6 @@ def noise_keys() -> tuple[Key, ...]:
     return tuple(_keys(SelfMotionNoise, ("noise",), {"noise": None}))
 
 
-def key_paths(model: type) -> Iterator[tuple[str, ...]]:
-    """The places of all keys that hold values, without their meanings, which take longer to read."""
-    for name, annotation, _ in fields_of(model):
-        yield from ((name, *rest) for rest in key_paths(annotation)) if is_model(annotation) else ((name,),)
-
-
 def is_model(kind: Any) -> bool:
     """Whether a type has keys of its own."""
     return isinstance(kind, type) and (issubclass(kind, BaseModel) or dataclasses.is_dataclass(kind))

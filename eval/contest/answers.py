@@ -14,6 +14,7 @@ from hippodrome.core.types import CognitiveMap, FloatArray, LocalizationEstimate
 from hippodrome.eval.methods.protocol import Cost, Mapped, MethodError
 from hippodrome.eval.metrics.association import MAX_COORDINATE, check_trajectory
 from hippodrome.eval.results.model import Row
+from hippodrome.sim.key_words import first_fault
 
 # Figures of its map that a method may state itself; all other names of a row are ours to measure.
 STATED: Final = ("camera_frames", "keyframes", "vertices", "edges")
@@ -105,8 +106,7 @@ def _figures(given: Any, label: str) -> dict[str, Any]:
     try:
         Row(method=label, **figures)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise MethodError(f"{label}: its figure '{'.'.join(map(str, first['loc']))}': {first['msg']}") from None
+        raise MethodError(f"{label}: its figure {first_fault(error, figures)}") from None
     return figures
 
 

@@ -24,9 +24,10 @@ from hippodrome.eval.programs.stream import StreamLocalizer, StreamMapper
 from hippodrome.eval.results.model import Declaration
 from hippodrome.eval.rivals.orbslam3.method import OrbSlam3
 from hippodrome.eval.rivals.rows import NoAttractor, RatSlamMethod
-from hippodrome.sim.key_words import METHOD_NAME, faults_of
+from hippodrome.sim.key_words import faults_of
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.scenario import Scenario
+from hippodrome.sim.value_words import METHOD_NAME
 
 # In the order of the tables. They are made and run as everybody's methods are.
 BUILT_IN: Final[tuple[type[Any], ...]] = (DeadReckoning, SemiMetric, RatSlamMethod, NoAttractor, TopometricPaper, Topometric)

@@ -22,9 +22,9 @@ from hippodrome.eval.programs.process import Process, command_words, started
 from hippodrome.eval.programs.stream import VERSION, Line, camera_message
 from hippodrome.proto import method_stream_pb2 as pb
 from hippodrome.proto.driving import command_of, lane_messages, observation_message, radar_message
-from hippodrome.sim.key_words import POLICY
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.render.camera import CameraSpec
+from hippodrome.sim.value_words import POLICY
 
 CHILD: Final = "hippodrome.eval.drive.child"
 BEGIN_LIMIT_S: Final = 120.0  # to load, to read the map and to compile, before the first step

@@ -24,6 +24,7 @@ from hippodrome.eval.results.model import (
     to_json,
 )
 from hippodrome.eval.reuse import DRIVE_INDEPENDENT_KEYS
+from hippodrome.sim.key_words import first_fault
 from hippodrome.sim.limits import refuse_truth_values
 
 FORMAT: Final = 1
@@ -111,9 +112,8 @@ def read_baseline(path: Path) -> Baseline:
     except FileNotFoundError:
         raise GateError(f"{path}: no baseline there; make one with `hippodrome gate --update`") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise GateError(f"{path}: {place or 'top level'}: {first['msg']}") from error
+        cure = "name another, or make it anew with --update"
+        raise GateError(f"{path}: {first_fault(error, data, Baseline)}; {cure}") from error
     except (OSError, ValueError, RecursionError) as error:  # ValueError: no JSON, no UTF-8, or a number of thousands of digits
         cure = "name another, or make it anew with --update"
         raise GateError(f"{path}: not a readable baseline: {why_unreadable(error)}; {cure}") from error

@@ -11,6 +11,7 @@ from hippodrome._files import read_bounded
 from hippodrome._json import parse_json
 from hippodrome.core.types import HippodromeError, MatchBreak, MatchStatus
 from hippodrome.eval.real.findings import Finding, Kind
+from hippodrome.sim.key_words import first_fault
 
 REFINE_AGAIN: Final = "not the breaks of a refinement; delete it, and the same command makes it anew"
 MAX_BYTES: Final = 16 << 20  # of a file that is kept; a run of hours writes some 100 kB
@@ -93,10 +94,9 @@ def _check_vertices(path: Path, stretches: list[tuple[int, int]], vertices: int)
 
 def _read(path: Path, model: TypeAdapter[Any], complaint: str) -> Any:
     try:
-        return model.validate_python(parse_json(read_bounded(path, MAX_BYTES)))
+        data = parse_json(read_bounded(path, MAX_BYTES))
+        return model.validate_python(data)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise HippodromeError(f"{path}: {place}: {first['msg']}: {complaint}") from None
+        raise HippodromeError(f"{path}: {first_fault(error, data)}: {complaint}") from None
     except (OSError, ValueError, RecursionError) as error:
         raise HippodromeError(f"{path}: {' '.join(str(error).split())[:200]}: {complaint}") from None

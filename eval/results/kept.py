@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from hippodrome._files import read_bounded, why_unreadable
 from hippodrome._json import parse_json
 from hippodrome.eval.results.model import MAX_BYTES, ResultsError
+from hippodrome.sim.key_words import first_fault
 
 
 def read_kept(path: Path, kind: Any, complaint: str, cure: str) -> Any:
@@ -26,10 +27,9 @@ def read_kept(path: Path, kind: Any, complaint: str, cure: str) -> Any:
     """
     try:
         data = read_bounded(path, MAX_BYTES)
-        parse_json(data)  # the reader below would take one of two keys of a name without a word
+        content = parse_json(data)  # the reader below would take one of two keys of a name without a word
         return TypeAdapter(kind).validate_json(data)
     except ValidationError as error:
-        reason = error.errors(include_url=False)[0]["msg"]
-        raise ResultsError(f"{path}: {complaint}: {reason}; {cure}") from error
+        raise ResultsError(f"{path}: {complaint}: {first_fault(error, content)}; {cure}") from error
     except (OSError, ValueError, RecursionError) as error:
         raise ResultsError(f"{path}: {complaint}: {why_unreadable(error)}; {cure}") from error

@@ -14,6 +14,7 @@ from hippodrome._json import parse_json
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.metrics.localization import LocalizationScore
 from hippodrome.eval.metrics.trajectory import Score
+from hippodrome.sim.key_words import first_fault
 from hippodrome.sim.limits import refuse_truth_values
 
 DECIMALS: Final = 6  # of every number: finer than any figure means, coarser than the rounding in which machines differ
@@ -194,11 +195,11 @@ def write_results(path: Path, results: Results) -> None:
 def read_results(path: Path) -> Results:
     """Read and validate ``results.json``. Raises ResultsError, which names the file, the field and the reason."""
     try:
-        return Results.model_validate(parse_json(read_bounded(path, MAX_BYTES)))
+        data = parse_json(read_bounded(path, MAX_BYTES))
+        return Results.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise ResultsError(f"{path}: {place or 'top level'}: {first['msg']}") from error
+        cure = "name another, or make it anew by the command that wrote it"
+        raise ResultsError(f"{path}: {first_fault(error, data, Results)}; {cure}") from error
     except (OSError, ValueError, RecursionError) as error:  # ValueError: no JSON, no UTF-8, or a number of thousands of digits
         cure = "name the folder that a command had as its --out, and let that command finish"
         if isinstance(error, FileNotFoundError | NotADirectoryError):

@@ -17,7 +17,7 @@ from hippodrome.eval.contest.sources import methods_sha256
 from hippodrome.eval.files.scenarios import read_scenario
 from hippodrome.eval.reuse import figure_code_sha256
 from hippodrome.eval.sweep.executors import SweepError
-from hippodrome.sim.key_words import faults_of
+from hippodrome.sim.key_words import faults_of, place_of
 from hippodrome.sim.renamed import REMOVED, present_key
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.self_motion import NOISE_LEVELS
@@ -117,7 +117,10 @@ def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
     try:
         return Scenario.model_validate(values)
     except ValidationError as error:
-        raise SweepError(f"--set {key}={value}: {faults_of(error, values)[0].words}") from None
+        fault = faults_of(error, values, Scenario)[0]
+        place = place_of(fault.location)
+        inner = "" if place == present_key(key) else f"{place}: "  # a value with keys of its own may have a fault below
+        raise SweepError(f"--set {key}={value}: {inner}{fault.words}") from None
 
 
 def cell_code_sha256() -> str:

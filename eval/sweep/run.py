@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from hippodrome._files import read_bounded, write_atomically
+from hippodrome._files import read_bounded, why_unreadable, write_atomically
 from hippodrome._json import parse_json
 from hippodrome.eval.contest.entry import Added
 from hippodrome.eval.pool import progress_bar
@@ -19,6 +19,7 @@ from hippodrome.eval.sweep.cell import CellResult, CellTask, RecordingTask, make
 from hippodrome.eval.sweep.executors import Failure, Runner, SweepError, dask_cluster, local_processes
 from hippodrome.eval.sweep.grid import Parameter, SweepCell, cell_code_sha256, make_grid
 from hippodrome.eval.sweep.table import pooled_rows, sweep_markdown
+from hippodrome.sim.key_words import first_fault
 from hippodrome.sim.record import RecordingPlan
 from hippodrome.sim.render.probe import require_gl
 
@@ -105,10 +106,10 @@ def _finished(cell: SweepCell, out: Path) -> CellResult | None:
 def _read(path: Path) -> CellResult:
     try:
         return CellResult.model_validate(parse_json(read_bounded(path, MAX_BYTES)))
-    except (OSError, UnicodeDecodeError, ValueError, ValidationError, RecursionError) as error:
-        raise SweepError(
-            f"{path}: not a cell's result ({' '.join(str(error).split())[:100]}); delete it to run the cell again"
-        ) from None
+    except ValidationError as error:
+        raise SweepError(f"{path}: not a cell's result: {first_fault(error, None)}; delete it to run the cell again") from None
+    except (OSError, ValueError, RecursionError) as error:  # ValueError: no JSON, no UTF-8
+        raise SweepError(f"{path}: not a cell's result: {why_unreadable(error)}; delete it to run the cell again") from None
 
 
 def _merge(cells: Sequence[SweepCell], finished: dict[SweepCell, CellResult], failures: dict[SweepCell, str], out: Path) -> None:

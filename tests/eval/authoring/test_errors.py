@@ -32,16 +32,16 @@ thresholds:
 EXPECTED = [
     "1: name: results are filed under it: letters",
     "2: nose: unknown key; did you mean noise?",
-    "4: camera.fov_deg: Input should be less than or equal to 150, not 200",
+    "4: camera.fov_deg: must be a number of at most 150, not 200",
     "5: camera.hight: unknown key; did you mean camera.height?",
-    "6: noise.scale_wander: Input should be greater than or equal to 0, not -1",
+    "6: noise.scale_wander: must be a number of at least 0, not -1",
     "6: noise.gyro_gian: unknown key; did you mean noise.gyro_gain?",
     "8: mapping.tour.lenght_m: unknown key; did you mean mapping.tour.length_m?",
     "9: town: takes keys of its own",
     "10: localization.tour: must be given",
     "12: localization.conditions: given twice, first in line 11; remove one",
-    "12: localization.conditions.dusk: Input should be less than or equal to 1, not 2",
-    "14: thresholds.ape_mean_m: Input should be a valid number",
+    "12: localization.conditions.dusk: must be a number of at most 1, not 2",
+    "14: thresholds.ape_mean_m: must be a number, not 'five'",
 ]
 
 
@@ -65,35 +65,37 @@ def test_all_errors_in_the_order_of_the_file(errors_of):
 @pytest.mark.parametrize(("text", "expected"), [
     ("name: a\n", []),
     ("seed: 1\n", ["1: name: must be given"]),
-    ("name: a\nnoise: worse\n", ["2: noise: Input should be 'clean', 'paper', 'realistic' or 'harsh', or keys of its own "
-                                 "(docs/scenarios.md lists them), not 'worse'"]),
+    ("name: a\nnoise: worse\n", ["2: noise: must be 'clean', 'paper', 'realistic' or 'harsh', or keys of its own "
+                                 "(units_per_metre, units_per_metre_spread, scale_wander, ...), not 'worse'"]),
     ("name: a\nmapping: {tour: {}, closed: 5000}\n",
-     ["2: mapping.closed: Input should be a list, as in [a, b], or a number of at most 100, not 5000"]),
+     ["2: mapping.closed: must be a list, as in [a, b], or a number of at most 100, not 5000"]),
     ("name: a\nmapping: {tour: {}, closed: A0A1}\n",
-     ["2: mapping.closed: Input should be a list, as in [a, b], or a whole number, not 'A0A1'"]),
+     ["2: mapping.closed: must be a list, as in [a, b], or a whole number, not 'A0A1'"]),
     ("name: a\nmapping: {tour: {}, closed: [a, 5]}\n",
-     ["2: mapping.closed.1: Input should be text, in quotes where it looks like a number or a word like yes, not 5"]),
-    ("name: a\nmissions: {rows: ours}\n", ["2: missions.rows: Input should be a list, as in [a, b], not 'ours'"]),
+     ["2: mapping.closed.1: must be text, in quotes where it looks like a number or a word like yes, not 5"]),
+    ("name: a\nmissions: {rows: ours}\n", ["2: missions.rows: must be a list, as in [a, b], not 'ours'"]),
     ("name: a\nmissions: {policies: {a: b}}\n",
-     ["2: missions.policies.a: Input should be my_package.my_module:MyPolicy, or exec: or stream: and a command, not 'b'"]),
-    ("name: a\nmethods: [a]\n", ["2: methods: Input should be names with values, as in {a: b}"]),
+     ["2: missions.policies.a: must be my_package.my_module:MyPolicy, or exec: or stream: and a command, not 'b'"]),
+    ("name: a\nmethods: [a]\n", ["2: methods: must be names with values, as in {a: b}, not a list"]),
     ("name: a\nmethods: {a: 5}\n",
-     ["2: methods.a: Input should be my_package.my_module:MyClass, exec: or stream: and a command, or keys of its own, not 5"]),
+     ["2: methods.a: must be my_package.my_module:MyClass, exec: or stream: and a command, or keys of its own, not 5"]),
     ("name: a\nmethods: {a: b}\n",
-     ["2: methods.a: Input should be my_package.my_module:MyClass, or exec: or stream: and a command, not 'b'"]),
+     ["2: methods.a: must be my_package.my_module:MyClass, or exec: or stream: and a command, not 'b'"]),
     ("name: a\nmethods: {a!: 'b:C'}\n",
      ["2: methods.a!: a name begins with a letter or digit and has letters, digits, spaces and . _ + ( ) , - , at most 40, "
       "not 'a!'"]),
     ("name: a\nmethods: {a: {stream: b, needs: [c]}}\n",
-     ["2: methods.a.needs.0: Input should be road_network, start_pose, stereo, grain, metric_scale, or a size like 640x480, "
+     ["2: methods.a.needs.0: must be road_network, start_pose, stereo, grain, metric_scale, or a size like 640x480, "
       "not 'c'"]),
-    ("name: a\ntown: {network: no}\n", ["2: town.network: Input should be the path of a file, in quotes where it looks like a "
+    ("name: a\ntown: {network: no}\n", ["2: town.network: must be the path of a file, in quotes where it looks like a "
                                        "number or a word like yes, not false"]),
-    ("name: a\nseed: 0x" + 5000 * "f" + "\n", ["2: seed: Input should be less than 2147483648"]),
-    ("name: a\nseed: yes\n", ["2: seed: Input should be a valid integer, not true"]),
+    ("name: a\nseed: 0x" + 5000 * "f" + "\n", ["2: seed: must be a number below 2147483648"]),
+    ("name: a\nseed: yes\n", ["2: seed: must be a whole number, not true"]),
     ("name: a\nseed: 1\nseed: 1\n", ["3: seed: given twice, first in line 2; remove one"]),
     ("name: a\ncamera: {rate_hz: 3}\n", ["1: odometry_rate_hz 10 is not a whole multiple of camera.rate_hz 3"]),
-    ("name: a\nmapping: {tour: {}}\nzzzzzz: 1\n", ["3: zzzzzz: unknown key; docs/scenarios.md lists all"]),
+    ("name: a\nmapping: {tour: {}}\nzzzzzz: 1\n",
+     ["3: zzzzzz: unknown key; take it out; there are name, description, seed, town, camera, odometry_rate_hz, noise, mapping, "
+      "localization, mapper, refine, localizer; docs/scenarios.md lists all"]),
 ])  # fmt: skip
 def test_each_kind_of_error(errors_of, text, expected):
     assert errors_of(text) == expected

@@ -97,14 +97,14 @@ def test_a_run_that_was_killed_resumes(drive, finished, capsys):
 
 
 @pytest.mark.parametrize(("name", "text", "said"), [
-    ("run.json", '{"stages": []}', "stages: Input should be a valid dictionary: not the record of a run; choose a new --out"),
-    ("run.json", '{"asked": {"MAP": 3}}', "asked.MAP: Input should be a valid string"),
-    ("run.json", '{"stages": {"map": {"seconds": 1}}}', "stages.map.said: Field required"),
+    ("run.json", '{"stages": []}', "stages: must be names with values, as in {a: b}, not a list: not the record of a run"),
+    ("run.json", '{"asked": {"MAP": 3}}', "asked.MAP: must be text"),
+    ("run.json", '{"stages": {"map": {"seconds": 1}}}', "stages.map.said: must be given"),
     ("run.json", "[", "not the record of a run"),
     ("run.json", "9" * 5000, "not the record of a run"),
     ("refinement.json", "{", "not the breaks of a refinement; delete it, and the same command makes it anew"),
     ("refinement.json", '{"breaks": [{"first": 0, "last": 1, "status": "X", "cause": ""}]}', "'X' is no status of a match"),
-    ("refinement.json", '{"breaks": [{"first": 0}]}', "breaks.0.last: Field required"),
+    ("refinement.json", '{"breaks": [{"first": 0}]}', "breaks.0.last: must be given"),
 ])  # fmt: skip
 def test_what_a_run_keeps_is_not_believed_blindly(drive, finished, tmp_path, capsys, name, text, said):
     out = tmp_path / "out"

@@ -23,6 +23,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from hippodrome._output import terminal
 from hippodrome._processes import ENDING, die_with_parent, end_children
+from hippodrome._spawn import SpawnPool, hear_signals
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.files.progress import Teller
 
@@ -135,7 +136,7 @@ def worker_pool(workers: int, plan: Sequence[str] = (), folder: Path | None = No
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """``workers`` processes. They are spawned, not forked, as SUMO and GL keep state that must not be inherited."""
-    executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker)
+    executor = SpawnPool(workers, _quiet_worker)
     try:
         yield executor
     except BaseException as error:
@@ -189,6 +190,7 @@ def _quiet_worker() -> None:
         if signal.getsignal(number) is not signal.SIG_IGN:  # a shell lets commands in the background ignore interrupts
             signal.signal(number, _leave)
     sys.stdout = sys.stderr
+    hear_signals()
 
 
 def perform(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT:

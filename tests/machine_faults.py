@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from tests.chaos import USUAL, Chaos
+from tests.disturbed import USUAL, Chaos
 
 KINDS: Final = ("disk full", "no inodes", "read-only", "temporary disk full", "folder deleted")
 # Arguments: the folder, size [KiB] (0: any), how many files (0: any), tenths of a second until it is read-only (0: never), the
@@ -60,18 +60,18 @@ def suffered(chaos: Chaos, name: str, fault: MachineFault) -> list[str]:
     """Run a command with a fault, and again without; what was wrong, in words that begin with its kind."""
     whole, out = chaos.undisturbed(fault.command), chaos.folder / name
     if fault.kind == "folder deleted":
-        process = chaos.start(fault.command, out)
+        started = chaos.start(fault.command, out)
         time.sleep(fault.share * chaos.took_s[fault.command])
         shutil.rmtree(out, ignore_errors=True)
     else:
         out.mkdir()
-        process = chaos.start(fault.command, out, within=_within(chaos, whole, out, fault))
-    faults = chaos.faults_of_end(process, (2,) if fault.command == "eval" else (1, 2))  # 1: cells that failed, missions that fell
+        started = chaos.start(fault.command, out, within=_within(chaos, whole, out, fault))
+    ends = (0, 2) if fault.command == "eval" else (0, 1, 2)  # 1: cells that failed, missions that fell
+    faults = chaos.faults_of_end(started, ends, strict=False)
     if (kept := _kept(out)).exists() and "temporary" not in fault.kind:
         shutil.rmtree(out)
         kept.rename(out)
-    status, said = chaos.ended(chaos.start(fault.command, out))
-    return faults + chaos.faults_of_rerun(status, said, whole, out, chaos.status[fault.command])
+    return faults + chaos.rerun(fault.command, whole, out)
 
 
 def _kept(out: Path) -> Path:

@@ -26,7 +26,7 @@ if __name__ == "__main__":
     except KeyboardInterrupt as error:
         sys.exit(128 + getattr(error, "number", signal.SIGINT))
 """
-LIMIT_S = 60.0
+LIMIT_S = 240.0  # of a machine that others use
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 
 

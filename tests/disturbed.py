@@ -93,6 +93,7 @@ class Chaos:
 
     def __init__(self, folder: Path, twice: bool = True) -> None:
         self.folder = folder
+        self.mark = f"CHAOS_FOLDER={folder}"  # a variable by which all that a command starts is known, in other sessions, too
         self.twice = twice  # whether two undisturbed runs are compared: what differs there, no disturbed one can be blamed for
         self.scenario = folder / "tiny.yaml"
         self.scenario.write_text(SCENARIO)
@@ -121,7 +122,7 @@ class Chaos:
         """Variables of a command; compiled modules are kept, as a user's are."""
         path = os.pathsep.join([str(self.folder), *filter(None, [os.environ.get("PYTHONPATH")])])
         kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-        return {**kept, "TMPDIR": str(self.temporary), "PYTHONPATH": path}
+        return {**kept, "TMPDIR": str(self.temporary), "PYTHONPATH": path, **dict([self.mark.split("=", 1)])}
 
     def undisturbed(self, command: str) -> Path:
         """The results of a run that nobody disturbs; made once, after another one, which may have to compile code."""
@@ -248,7 +249,7 @@ class Chaos:
 
     def _living(self, started: Sequence[Started]) -> list[int]:
         own = [pid for one in started for pid in session(one.process.pid)]
-        return sorted({*own, *started_with(f"TMPDIR={self.temporary}")})
+        return sorted({*own, *started_with(self.mark)})
 
     def faults_of_rerun(self, status: int | None, said: str, whole: Path, out: Path, expected: int | None = 0) -> list[str]:
         """What is wrong with a rerun in ``out``, of which ``whole`` has the undisturbed results."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -85,8 +86,9 @@ def _town_and_drives(
     if pool is None:
         town = plans[0].town()
         return town, [simulate(plan, town) for plan in plans]
-    for _ in plans:
-        pool.executor.submit(_load)
+    with suppress(BrokenProcessPool):  # a process that died is told when it is asked to drive
+        for _ in plans:
+            pool.executor.submit(_load)
     town, network = plans[0].town(), str(scenario.town.network)
     return town, pool.run("simulate", _simulate, [(plan, town) for plan in plans], place=lambda _: network)
 

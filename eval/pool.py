@@ -23,6 +23,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from hippodrome._output import terminal
 from hippodrome._processes import ENDING, die_with_parent, end_children
+from hippodrome._spawn import SpawnPool, hear_signals
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.files.progress import Teller
 
@@ -73,12 +74,14 @@ class Workers:
             HippodromeError: A process died, or what a task raised.
         """
         bar = self.progress.add_task(stage, total=sum(weight(item) for item in tasks))
-        items = {self.executor.submit(perform, task, item): item for item in tasks}
-        futures = {future: weight(item) for future, item in items.items()}
-        self.teller.begin(stage, len(futures))
-        pending, begun = set(futures), set[Future[ResultT]]()
-        processes = list((getattr(self.executor, "_processes", None) or {}).values())  # no public way tells how one ended
+        items, futures = dict[Future[ResultT], TaskT](), dict[Future[ResultT], int]()
+        begun, processes = set[Future[ResultT]](), self._alive()
         try:
+            for one in tasks:  # a process may have died between two stages, which the executor says here
+                future = self.executor.submit(perform, task, one)
+                items[future], futures[future] = one, weight(one)
+            self.teller.begin(stage, len(futures))
+            pending, processes = set(futures), self._alive()
             while pending:
                 # Waiting for a short time at once, so that an interrupt from the keyboard takes effect without delay.
                 done, pending = wait(pending, timeout=0.2, return_when="FIRST_COMPLETED")
@@ -98,6 +101,10 @@ class Workers:
         finally:
             for future in futures:
                 future.cancel()
+
+    def _alive(self) -> list[BaseProcess]:
+        """The processes that there are; no public way tells how one of them ended."""
+        return list((getattr(self.executor, "_processes", None) or {}).values())
 
 
 def _ended_well(future: Future[ResultT]) -> bool:
@@ -135,7 +142,7 @@ def worker_pool(workers: int, plan: Sequence[str] = (), folder: Path | None = No
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """``workers`` processes. They are spawned, not forked, as SUMO and GL keep state that must not be inherited."""
-    executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker)
+    executor = SpawnPool(workers, _quiet_worker)
     try:
         yield executor
     except BaseException as error:
@@ -189,6 +196,7 @@ def _quiet_worker() -> None:
         if signal.getsignal(number) is not signal.SIG_IGN:  # a shell lets commands in the background ignore interrupts
             signal.signal(number, _leave)
     sys.stdout = sys.stderr
+    hear_signals()
 
 
 def perform(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT:

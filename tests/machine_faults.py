@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from tests.chaos import USUAL, Chaos
+from tests.disturbed import USUAL, Chaos
 
 KINDS: Final = ("disk full", "no inodes", "read-only", "temporary disk full", "folder deleted")
 # Arguments: the folder, size [KiB] (0: any), how many files (0: any), tenths of a second until it is read-only (0: never), the
@@ -56,22 +56,27 @@ def can_mount() -> bool:
         return False
 
 
-def suffered(chaos: Chaos, name: str, fault: MachineFault) -> list[str]:
-    """Run a command with a fault, and again without; what was wrong, in words that begin with its kind."""
+def suffered(chaos: Chaos, name: str, fault: MachineFault) -> list[str] | None:
+    """Run a command with a fault, and again without; what was wrong, or None where it had ended before the fault came."""
     whole, out = chaos.undisturbed(fault.command), chaos.folder / name
+    began = time.monotonic()
     if fault.kind == "folder deleted":
-        process = chaos.start(fault.command, out)
+        started = chaos.start(fault.command, out)
         time.sleep(fault.share * chaos.took_s[fault.command])
+        late = started.process.poll() is not None
         shutil.rmtree(out, ignore_errors=True)
     else:
         out.mkdir()
-        process = chaos.start(fault.command, out, within=_within(chaos, whole, out, fault))
-    faults = chaos.faults_of_end(process, (2,) if fault.command == "eval" else (1, 2))  # 1: cells that failed, missions that fell
+        started = chaos.start(fault.command, out, within=_within(chaos, whole, out, fault))
+        chaos.ended(started)
+        late = fault.kind == "read-only" and time.monotonic() - began < fault.share * chaos.took_s[fault.command]
+    ends = (0, 2) if fault.command == "eval" else (0, 1, 2)  # 1: cells that failed, missions that fell
+    faults = chaos.faults_of_end(started, ends, strict=False)
     if (kept := _kept(out)).exists() and "temporary" not in fault.kind:
         shutil.rmtree(out)
         kept.rename(out)
-    status, said = chaos.ended(chaos.start(fault.command, out))
-    return faults + chaos.faults_of_rerun(status, said, whole, out, chaos.status[fault.command])
+    faults += chaos.rerun(fault.command, whole, out)
+    return None if late and not faults else faults
 
 
 def _kept(out: Path) -> Path:

@@ -16,7 +16,7 @@ MAY_IMPORT = {
     "core": {"core"},
     "sim": {"_files", "_folders", "_json", "_native", "_processes", "core", "sim"},
     "proto": {"_files", "core", "proto"},
-    "eval": {"_files", "_folders", "_json", "_native", "_output", "_processes", "core", "sim", "proto", "eval"},
+    "eval": {"_files", "_folders", "_json", "_native", "_output", "_processes", "_spawn", "core", "sim", "proto", "eval"},
 }
 # What each room of core may import; every room may import types and se2.
 CORE_ROOMS = {

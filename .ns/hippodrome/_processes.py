@@ -70,13 +70,14 @@ def dying_with_me() -> Callable[[], None]:
 def ending_like_an_interrupt() -> Iterator[None]:
     """Within the block the signals of ``ENDING`` raise ``Terminated``; a second one ends the process as it always did.
 
-    Signals that are ignored, as ``nohup`` asks for, stay so. Only the main thread can have it otherwise.
+    SIGINT raises ``KeyboardInterrupt``, as Python has it. Signals that are ignored, as ``nohup`` asks for, stay so. Only the main
+    thread can have it otherwise.
     """
     kept = {}
     with suppress(ValueError):  # not the main thread
-        for number in ENDING:
+        for number in (*ENDING, signal.SIGINT):
             if signal.getsignal(number) == signal.SIG_DFL:
-                kept[number] = signal.signal(number, _raise_terminated)
+                kept[number] = signal.signal(number, _raise_terminated if number in ENDING else signal.default_int_handler)
     try:
         yield
     finally:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,8 +76,9 @@ def preview_scenario(scenario: Scenario, out: Path) -> Preview:
             require_gl()
             shown = [_with_stills(plan, town, *result) for plan, result in zip(plans, simulated, strict=True)]
         else:
-            for _ in plans:
-                pool.executor.submit(_load)  # what the processes need, while the town is read
+            with suppress(BrokenProcessPool):  # a process that died is told when it is asked to drive
+                for _ in plans:
+                    pool.executor.submit(_load)  # what the processes need, while the town is read
             town, network = plans[0].town(), str(scenario.town.network)
             require_gl()
             helper.submit(_load_figures)

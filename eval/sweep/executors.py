@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
@@ -87,9 +87,14 @@ class Runner:
         empty if none died.
         """
         with self.executors(width) as executor:
-            futures = {executor.submit(partial(_guarded, task), item): item for item in items}
+            futures, left = dict[Future[ResultT | Failure], TaskT](), list(items)
             try:
-                return _watch(futures, tell)
+                with suppress(BrokenProcessPool):  # a process died already: who is not begun waits for the next pass
+                    while left:
+                        futures[executor.submit(partial(_guarded, task), left[0])] = left[0]
+                        del left[0]
+                died, waiting = _watch(futures, tell)
+                return died, waiting + left
             finally:
                 for future in futures:
                     future.cancel()

@@ -56,6 +56,19 @@ def test_a_worker_that_dies_is_told_with_what_it_worked_on(name, said):
     assert "\n" not in str(caught.value)
 
 
+def test_a_worker_that_dies_between_two_stages_is_told_by_the_next():
+    with worker_pool(1) as pool, pytest.raises(HippodromeError, match=r"weigh: a worker process died \(out of memory"):
+        pid = pool.run("size", _pid, [None])[0]
+        os.kill(pid, signal.SIGKILL)
+        while not getattr(pool.executor, "_broken", True):
+            time.sleep(0.01)
+        pool.run("weigh", abs, ["a"], place=lambda item: f"net {item}")
+
+
+def _pid(_):
+    return os.getpid()
+
+
 @pytest.mark.parametrize(("handler", "seconds", "status"), [("default_int_handler", 60.0, INTERRUPTED), ("SIG_IGN", 1.0, 0)])
 def test_an_interrupt_ends_busy_and_idle_workers_quietly_unless_it_is_ignored(tmp_path, handler, seconds, status):
     """A shell's background commands ignore the keyboard, their workers too."""

@@ -2,6 +2,8 @@
 
 import os
 import signal
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 
 import pytest
 from rich.progress import Progress
@@ -40,6 +42,27 @@ def test_each_fails_alone():
         "hung up": Failure(DIED),  # the main process, which nobody hung up, goes on
         "leaver": Failure("it left the process with status 3"),
     }
+
+
+def test_what_could_not_be_begun_as_a_process_had_died_is_done_later():
+    executors = iter([_BreaksAtOnce(), ThreadPoolExecutor(), ThreadPoolExecutor()])
+    found = {}
+    with Progress(disable=True) as progress:
+        Runner(lambda width: next(executors), progress).run("work", work, ["a", "b", "c"], found.__setitem__)
+    assert found == {"a": "A", "b": "B", "c": "C"}
+
+
+class _BreaksAtOnce(ThreadPoolExecutor):
+    """Its first task dies with its process before the second one is submitted."""
+
+    _died = False
+
+    def submit(self, task, /, *arguments):
+        if self._died:
+            raise BrokenProcessPool("a child process terminated abruptly")
+        self._died, future = True, Future()
+        future.set_exception(BrokenProcessPool("a child process terminated abruptly"))
+        return future
 
 
 def test_a_scheduler_that_is_not_there(monkeypatch):

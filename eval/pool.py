@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import multiprocessing
 import os
 import signal
@@ -197,6 +198,13 @@ def _quiet_worker() -> None:
             signal.signal(number, _leave)
     sys.stdout = sys.stderr
     hear_signals()
+    atexit.register(_end)
+
+
+def _end() -> None:
+    """The end of a worker that has nothing left to do: Python would go through all of its objects, which takes half a second."""
+    sys.stderr.flush()
+    os._exit(0)
 
 
 def perform(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT:

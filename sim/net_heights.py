@@ -21,11 +21,11 @@ AT_ENDS_M: Final = 12.0  # roads that meet this close to an end of one of them s
 
 def lane_heights_m(net: SumoNet, network: RoadNetwork) -> FloatArray | None:
     """Height (P,) of each point of the network's lanes as the file has them; None where the network is flat."""
-    shapes = [np.array(net.getLane(lane).getShape3D(), dtype=np.float64).reshape(-1, 3) for lane in network.lane_ids]
-    lowest, highest = min(s[:, 2].min() for s in shapes), max(s[:, 2].max() for s in shapes)
-    if highest - lowest < FLAT_M:
+    shapes = [net.getLane(lane).getShape3D() for lane in network.lane_ids]
+    heights = [z for shape in shapes for _, _, z in shape]
+    if max(heights) - min(heights) < FLAT_M:
         return None
-    parts = [_heights_at(shape, network.lane_points_m(lane)) for lane, shape in enumerate(shapes)]
+    parts = [_heights_at(np.array(shape, dtype=np.float64), network.lane_points_m(lane)) for lane, shape in enumerate(shapes)]
     return np.concatenate(parts)
 
 

@@ -166,10 +166,11 @@ def _side_lanes(lanes: list[SumoLane], index: dict[str, int], step: int) -> IntA
 
 
 def _shapes(lanes: list[SumoLane], successors: list[list[int]], net_file: Path) -> list[FloatArray]:
-    shapes = [_without_repeats(np.array(lane.getShape(), dtype=np.float64).reshape(-1, 2)) for lane in lanes]
-    for lane, shape in zip(lanes, shapes, strict=True):
-        if len(shape) == 0 or not np.isfinite(shape).all():
+    points = [_without_repeats(lane.getShape()) for lane in lanes]
+    for lane, shape in zip(lanes, points, strict=True):
+        if not shape or not all(math.isfinite(x) and math.isfinite(y) for x, y in shape):
             raise HippodromeError(f"{net_file}: lane {lane.getID()} has no valid shape; write the network again with netconvert")
+    shapes = [np.array(shape, dtype=np.float64) for shape in points]
     before = {s: i for i, after in enumerate(successors) for s in after}
     return [
         shape if len(shape) > 1 else _stretched(shape, _heading_near(shapes, successors[i], before.get(i)))
@@ -177,13 +178,13 @@ def _shapes(lanes: list[SumoLane], successors: list[list[int]], net_file: Path) 
     ]
 
 
-def _without_repeats(points_m: FloatArray) -> FloatArray:
+def _without_repeats(points_m: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
     """The polyline without points closer than ``MIN_LANE_M`` to their predecessor, which have no heading."""
-    kept: list[FloatArray] = []
-    for point in points_m:
-        if not kept or math.hypot(*(point - kept[-1])) >= MIN_LANE_M:
-            kept.append(point)
-    return np.array(kept).reshape(-1, 2)
+    kept: list[tuple[float, float]] = []
+    for x, y in points_m:
+        if not kept or math.hypot(x - kept[-1][0], y - kept[-1][1]) >= MIN_LANE_M:
+            kept.append((x, y))
+    return kept
 
 
 def _heading_near(shapes: list[FloatArray], after: list[int], before: int | None) -> float:

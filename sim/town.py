@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import math
+import os
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -90,9 +91,16 @@ def _check_side(choice: Choice, left_hand: bool, network: Path) -> None:
         )
 
 
-@many_objects()
 def read_town(net_file: Path, name: str | None = None) -> Town:
     """A town from a SUMO network file, checked."""
+    town = _read_town(net_file, name)
+    if town.network.lane_count > MANY_LANES:
+        gc.collect()  # sumolib's objects hold one another: hundreds of megabytes would wait for the next collection
+    return town
+
+
+@many_objects()
+def _read_town(net_file: Path, name: str | None = None) -> Town:
     net = load_net(net_file)
     check_places_to_wait(net, net_file)
     network = road_network(net, net_file)
@@ -113,12 +121,7 @@ def read_town(net_file: Path, name: str | None = None) -> Town:
     if heights_m is not None:
         outlines = (np.array(node.getShape3D(), dtype=np.float64) for node in _paved_nodes(net))
         town = replace(town, heights_m=heights_m, junction_heights_m=tuple(outline[:, 2] for outline in outlines))
-    town = replace(town, notes=notes)
-    large = network.lane_count > MANY_LANES
-    del net
-    if large:
-        gc.collect()  # sumolib's objects hold one another: hundreds of megabytes would wait for the next collection
-    return town
+    return replace(town, notes=notes)
 
 
 def _plan(spec: TownSpec, rng_seed: int) -> Plan:
@@ -268,15 +271,17 @@ def _beside_stop_line(lane: SumoNet, left_hand: bool) -> tuple[float, float, flo
     return x1 - aside * math.sin(heading), y1 + aside * math.cos(heading), heading
 
 
+@many_objects()
 def main(net_file: str, path: str) -> int:
     """Read a network and write the town, for ``read_apart``; the exit status."""
     try:
-        write_town(Path(path), read_town(Path(net_file)))
+        write_town(Path(path), _read_town(Path(net_file)))
     except HippodromeError as error:
         sys.stdout.buffer.write(str(error).encode(*ENCODING))
+        sys.stdout.buffer.flush()
         return REFUSED
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    os._exit(main(*sys.argv[1:]))  # the town is written: a second would go into the end of millions of objects

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hippodrome._native import give_back_memory
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray, Frame, IntArray
 from hippodrome.eval.authoring.network_notes import network_notes
@@ -17,7 +19,6 @@ from hippodrome.eval.pool import Workers, worker_pool
 from hippodrome.sim.episode import Samples, draw_frame
 from hippodrome.sim.network import edge_lengths_m
 from hippodrome.sim.record import ROLES, RecordingPlan, Role, simulate
-from hippodrome.sim.render.probe import gl_tried_beside
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.scene.build import build_scene
 from hippodrome.sim.types import Drive, Town
@@ -62,13 +63,19 @@ class _Shown:
     captions: list[str]
 
 
-def preview_scenario(scenario: Scenario, out: Path) -> Preview:
-    """Simulate both drives, and draw ``overview.png`` and ``stills.png`` into ``out``. Raises HippodromeError.
+def preview_scenario(scenario: Scenario, out: Path, require_gl: Callable[[], str]) -> Preview:
+    """Simulate both drives, and draw ``overview.png`` and ``stills.png`` into ``out``.
 
-    Whether OpenGL works is tried while the town is read; where both fail, what is wrong with the network is said.
+    Args:
+        scenario: What to drive.
+        out: Folder for the pictures.
+        require_gl: Raises where OpenGL does not work, and is asked when the town is there: what is wrong with that is said first.
+
+    Raises:
+        HippodromeError: The network cannot be used, or OpenGL does not work.
     """
     plans = [RecordingPlan(scenario, role, out) for role in ROLES]
-    with gl_tried_beside() as require_gl, _workers(scenario) as pool, ThreadPoolExecutor(1) as helper:
+    with _workers(scenario) as pool, ThreadPoolExecutor(1) as helper:
         if pool is None:
             helper.submit(_load_figures)
             town = plans[0].town()
@@ -108,8 +115,7 @@ def _workers(scenario: Scenario) -> AbstractContextManager[Workers | None]:
 
 
 def _load() -> None:
-    import hippodrome.sim.ego
-    import hippodrome.sim.render.renderer  # noqa: F401  # both take a second
+    import hippodrome.sim.ego  # noqa: F401  # takes seconds; OpenGL is loaded when SUMO has gone, since both need memory
 
 
 def _load_figures() -> None:
@@ -121,7 +127,9 @@ def _load_figures() -> None:
 def _simulate_and_draw(task: tuple[RecordingPlan, Town]) -> _Shown:
     """One task and not two: the shorter drive need not wait for the longer one, nor the town be sent again."""
     plan, town = task
-    return _with_stills(plan, town, *simulate(plan, town))
+    drive, samples = simulate(plan, town)
+    give_back_memory()  # what SUMO held of a large network
+    return _with_stills(plan, town, drive, samples)
 
 
 def visits_of_road(network: RoadNetwork, lane: IntArray) -> IntArray:

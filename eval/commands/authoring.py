@@ -126,14 +126,17 @@ def _validate(options: argparse.Namespace) -> int:
 
 
 def _preview(options: argparse.Namespace) -> int:
-    from hippodrome.eval.authoring.preview import preview_scenario
-    from hippodrome.eval.files.scenarios import read_scenario
+    from hippodrome.sim.render.probe import gl_tried_beside
 
-    for path in options.files:
-        scenario = read_scenario(path)
-        out = options.out / scenario.name
-        print("\n".join(preview_scenario(scenario, out).lines()))
-        print(f"pictures: {out / 'overview.png'}, {out / 'stills.png'}")
+    with gl_tried_beside() as require_gl:  # begun first: the next line takes as long as the trial
+        from hippodrome.eval.authoring.preview import preview_scenario
+        from hippodrome.eval.files.scenarios import read_scenario
+
+        for path in options.files:
+            scenario = read_scenario(path)
+            out = options.out / scenario.name
+            print("\n".join(preview_scenario(scenario, out, require_gl).lines()))
+            print(f"pictures: {out / 'overview.png'}, {out / 'stills.png'}")
     return DONE
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Final, TypeAlias
 
@@ -11,10 +11,11 @@ import shapely
 
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.scene.mesh import Mesh, boxes, instances, merge, polygons
-from hippodrome.sim.scene.placement import Border, Shapes, clear_of, rectangles, spread
+from hippodrome.sim.scene.placement import Bools, Border, Shapes, clear_of, rectangles, spread
 
 POLE_GAP_M: Final = 34.0  # between utility poles or lamps
 POST_CLEARANCE_M: Final = 0.5  # between a post and the asphalt
+TOUCHING_M: Final = 0.05  # of a board over the edge of a lane: the widest end just there, and bends are made of corners
 STEEL, WOOD, DARK = np.array([0.62, 0.64, 0.66]), np.array([0.42, 0.33, 0.25]), np.array([0.14, 0.15, 0.16])
 RED, WHITE, YELLOW, BLUE, GREEN = (
     np.array(c) for c in ([0.78, 0.10, 0.10], [0.94, 0.94, 0.92], [0.95, 0.78, 0.12], [0.12, 0.30, 0.62], [0.10, 0.46, 0.26])
@@ -91,7 +92,20 @@ def _sprinkled(
     centre = site.point_m + site.outward * setback_m
     shapes = rectangles(centre, site.inward_yaw_rad(), np.full(k, 0.9 * setback_m), np.full(k, 0.6 * setback_m))
     free = np.flatnonzero(clear_of(shapes, roads, 0.3) & clear_of(shapes, taken, 0.3))
-    return merge([make(rng, centre[i : i + 1], site.inward_yaw_rad()[i : i + 1]) for i in free])
+    made = [make(rng, centre[i : i + 1], site.inward_yaw_rad()[i : i + 1]) for i in free]
+    return merge([thing for thing, beside in zip(made, _are_beside(made, roads), strict=True) if beside])
+
+
+def _are_beside(things: Sequence[Mesh], roads: Shapes) -> Bools:
+    """Which things stand beside the roads with all their parts: boards are wider than the ground that is kept free for them, and
+    the road on the other side, or a side street, may be nearer than the one that they stand at."""
+    outlines = np.array([shapely.MultiPoint(thing.vertices_m[:, :2]).convex_hull for thing in things], dtype=object)
+    beside = np.ones(len(things), dtype=np.bool_)
+    if len(things) and len(roads):
+        thing, road = shapely.STRtree(roads).query(outlines, predicate="intersects")
+        over = shapely.intersects(outlines[thing], shapely.buffer(roads[road], -TOUCHING_M))
+        beside[thing[over]] = False
+    return beside
 
 
 def _box(origin: list[float], size: list[float], albedo: FloatArray) -> Mesh:

@@ -9,7 +9,8 @@ import shapely
 
 from hippodrome.sim.scene.build import build_scene
 from hippodrome.sim.scene.conditions_spec import Conditions
-from hippodrome.sim.scene.placement import clear_of, other_lanes
+from hippodrome.sim.scene.furniture import furniture_mesh
+from hippodrome.sim.scene.placement import Border, clear_of, other_lanes
 from hippodrome.sim.sumo_tools import run_tool
 from hippodrome.sim.town import read_town
 
@@ -56,3 +57,22 @@ def test_scenery_does_not_depend_on_the_files_name(tmp_path):
         tiles.append(build_scene(read_town(Path(net.rename(net.with_name(name)))), 1, Conditions()).tiles)
         net = net.with_name(name)
     assert all(np.array_equal(one.vertices_m, two.vertices_m) for one, two in zip(*tiles, strict=True))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_board_reaches_over_the_road_behind_it(seed):
+    """Signs are up to 1.8 m wide and turned across the road; a second road lies 1.5 m beside the one that they stand at."""
+    k = 1000
+    border = Border(np.stack([2.0 * np.arange(k), np.zeros(k)], axis=1), np.tile([0.0, 1.0], (k, 1)), np.full(k, 2.0))
+    here, behind = shapely.box(0.0, -6.0, 2.0 * k, 0.0), shapely.box(0.0, 1.5, 2.0 * k, 5.0)
+    nothing = np.zeros(0, dtype=object)
+
+    def boards(roads):
+        mesh = furniture_mesh(border, np.zeros(k), np.zeros((0, 3)), False, np.array(roads), nothing, np.random.default_rng(seed))
+        corners = mesh.vertices_m[mesh.faces]
+        return shapely.convex_hull(shapely.multipoints(corners[corners[:, :, 2].min(axis=1) < 4.0][:, :, :2]))
+
+    lanes = shapely.buffer(np.array([here, behind]), -0.06)
+    assert len(boards([here, behind])) > 20
+    assert np.all(clear_of(boards([here, behind]), lanes, 0.0))
+    assert not np.all(clear_of(boards([here]), lanes, 0.0)), "there would be some if nobody looked"

@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from hippodrome.eval.authoring.preview import visits_of_road
 from hippodrome.eval.authoring.reference import reference_markdown, with_tables
 from hippodrome.eval.authoring.schema import scenario_schema
 from hippodrome.eval.cli import main
+from hippodrome.sim.render import probe
 from hippodrome.sim.scenario import Scenario, load_scenario
 from hippodrome.sim.self_motion import SelfMotionNoise
 from hippodrome.sim.town import build_town
@@ -125,6 +127,22 @@ def test_preview_draws_both_drives_without_a_run(tmp_path, capsys):
     assert "localization drive on mapped roads" in said
     assert {one.name for one in (tmp_path / "p" / "village").iterdir() if one.is_file()} == {"overview.png", "stills.png"}
     assert not (tmp_path / "p" / "village" / "recordings").exists()
+
+
+def test_preview_says_what_is_wrong_with_the_network_and_else_that_opengl_does_not_work(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(probe, "_drivers", [])
+    monkeypatch.setattr(probe, "TRIAL", (sys.executable, "-c", "raise ImportError('Unable to load EGL library')"))
+    drives = "mapping: {tour: {length_m: 300}}\nlocalization: {tour: {length_m: 100}}\n"
+    (tmp_path / "broken.net.xml").write_text("<net>")
+    for name, town, said in (
+        ("broken", "{network: broken.net.xml}", "broken.net.xml: broken network"),
+        ("grid", "{kind: grid, width_m: 190, height_m: 190, road_km: 1.3}", "Unable to load EGL library"),
+    ):
+        path = tmp_path / f"{name}.yaml"
+        path.write_text(f"name: {name}\ntown: {town}\n{drives}")
+        assert main(["scenario", "preview", str(path), "--out", str(tmp_path / "p")]) == 2
+        err = capsys.readouterr().err
+        assert said in err and err.count("\n") == 1
 
 
 def test_visits_count_entries_not_samples(tmp_path):

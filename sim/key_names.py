@@ -31,8 +31,8 @@ def path_meant(model: Any, location: Sequence[int | str]) -> tuple[int | str, ..
     *parents, last = location
     if near := difflib.get_close_matches(str(last), names_at(model, parents), n=1, cutoff=ALIKE):
         return (*parents, near[0])
-    paths = list(_paths(model, ()))
-    near = difflib.get_close_matches(str(last), {path[-1] for path in paths}, n=1, cutoff=MORE_ALIKE)
+    paths = _all_paths(model) if isinstance(model, type) else ()
+    near = difflib.get_close_matches(str(last), sorted({path[-1] for path in paths}), n=1, cutoff=MORE_ALIKE)
     found = [path for path in paths if near and path[-1] == near[0]]
     return min(found, key=lambda path: (-_shared(path, parents), len(path)), default=None)
 
@@ -61,6 +61,12 @@ def unread_key(model: Any, data: Any, above: Sequence[int | str] = ()) -> tuple[
 def _shared(path: Sequence[str], parents: Sequence[int | str]) -> int:
     """How many parts two places have in common from the outermost on."""
     return next((number for number, pair in enumerate(zip(path, parents, strict=False)) if pair[0] != pair[1]), len(parents))
+
+
+@lru_cache(maxsize=64)
+def _all_paths(model: type) -> tuple[Path, ...]:
+    """The places of all keys of a model."""
+    return tuple(_paths(model, ()))
 
 
 def _paths(kind: Any, above: Path) -> Iterator[Path]:

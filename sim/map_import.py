@@ -15,7 +15,7 @@ from hippodrome.sim.driving_side import Choice, DrivingSide, opendrive_side, osm
 from hippodrome.sim.netconvert_notes import SPIRALS, netconvert_notes
 from hippodrome.sim.opendrive import with_arcs_for_arcs, with_lanes_swapped
 from hippodrome.sim.sumo_tools import run_tool
-from hippodrome.sim.xml_head import root_of
+from hippodrome.sim.xml_head import opened, root_of
 
 SUMO: Final = (".net.xml", ".net.xml.gz")
 OSM: Final = (".osm", ".osm.xml", ".osm.gz", ".osm.xml.gz", ".osm.bz2", ".osm.xml.bz2", ".osm.pbf", ".pbf")
@@ -118,11 +118,28 @@ def import_map(
         ending = ".osm" if source.name.lower().endswith(OSM) else ".xodr"
         plain, made = folder / f"map{ending}", folder / "made.net.xml"
         _unpack(source, plain)
-        root_of(plain, named=source)
+        _require_root(source, plain, root_of(plain, named=source)[0])
         notes = _convert(source, plain, made, driving_side, more_options)
         with replacing(net_file) as temporary:
             temporary.write_bytes(gzip.compress(_without_comments(made.read_text(encoding="utf-8")).encode(), mtime=0))
     return notes
+
+
+def _require_root(source: Path, plain: Path, root: str) -> None:
+    """Raise HippodromeError unless the first element of a map is one of its kind: netconvert finds no roads in all others."""
+    kind, wanted = ("OpenStreetMap", "osm") if plain.suffix == ".osm" else ("OpenDRIVE", "OpenDRIVE")
+    if root.rpartition(":")[2] == wanted:
+        return
+    with plain.open("rb") as stream:
+        head = stream.read(64).removeprefix(b"\xef\xbb\xbf").lstrip()
+    if root:
+        what = f"it begins with <{root}>, and {kind} with <{wanted}>"
+        cure = "that is a web page, fetch the map itself" if root.lower() == "html" else "give it the name of its kind"
+    elif head.startswith((b"{", b"[")):
+        what, cure = f"it is JSON, and {kind} is XML here", "ask for XML ([out:xml]), or convert it"
+    else:
+        what, cure = ("it has no XML element", "is it whole?") if head else ("it is empty", "fetch it again")
+    raise HippodromeError(f"{source}: cannot be imported: {what}; {cure}")
 
 
 def _convert(source: Path, plain: Path, made: Path, choice: Choice, more: tuple[str, ...] = ()) -> tuple[str, ...]:
@@ -196,7 +213,7 @@ def _netconvert(source: Path, plain: Path, made: Path, options: tuple[str, ...])
     try:
         run_tool("netconvert", *files, *options, input_bytes=plain.stat().st_size)
     except HippodromeError as error:
-        if "No edges loaded" in str(error):
+        if "No edges loaded" in str(error) or "No nodes loaded" in str(error):
             return ()
         reason = str(error).replace(f"{plain.parent}/", "")  # the user knows no folder of ours
         raise HippodromeError(f"{source}: cannot be imported: {_with_cure(reason, log)}") from error
@@ -241,9 +258,8 @@ def _unpack(source: Path, plain: Path) -> None:
     if source.name.lower().endswith((".pbf", ".bz2")):
         _unpack_osm(source, plain)
         return
-    opened = gzip.open if source.suffix.lower() == ".gz" else open
     try:
-        with opened(source, "rb") as packed, plain.open("wb") as out:
+        with opened(source) as packed, plain.open("wb") as out:  # by its first bytes: names say packed of what is not, and not
             while piece := packed.read(PIECE_BYTES):
                 out.write(piece)
                 if out.tell() > MAX_UNPACKED_BYTES:

@@ -14,7 +14,7 @@ import hippodrome.core.types
 ROOT = Path(hippodrome.core.types.__file__).parent.parent
 MAY_IMPORT = {
     "core": {"core"},
-    "sim": {"_files", "_folders", "_json", "_native", "_processes", "core", "sim"},
+    "sim": {"_files", "_folders", "_json", "_native", "_output", "_processes", "core", "sim"},
     "proto": {"_files", "core", "proto"},
     "eval": {"_files", "_folders", "_json", "_native", "_output", "_processes", "_spawn", "core", "sim", "proto", "eval"},
 }

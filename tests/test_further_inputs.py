@@ -29,9 +29,9 @@ TRAJECTORIES = {
                              .replace("--", "").encode(), DONE, "mean 0.8"),
     "beyond-all-floats": (TUM.replace(ROWS[3].split()[1], "1e400", 1).encode(), BAD_INPUT, "position is not finite"),
     "one-long-line": (" ".join(TUM.split()).encode(), BAD_INPUT, "96 columns"),
-    "nul-bytes": (TUM.replace("\n", "\0\n").encode(), BAD_INPUT, "line 1: could not convert"),
+    "nul-bytes": (TUM.replace("\n", "\0\n").encode(), BAD_INPUT, "is no number"),
     "latin-1": (b"# caf\xe9\n" + TUM.encode(), BAD_INPUT, "cannot be read as text"),
-    "hexadecimal": (TUM.replace("0.100 ", "0x1 ").encode(), BAD_INPUT, "line 1: could not convert"),
+    "hexadecimal": (TUM.replace("0.100 ", "0x1 ").encode(), BAD_INPUT, "is no number"),
     "packed": (gzip.compress(TUM.encode()), BAD_INPUT, "cannot be read as text"),
 }  # fmt: skip
 # Tables of self-motion, and what is said of them.

@@ -47,8 +47,8 @@ TRAJECTORIES = {
                                  BAD_INPUT, "unit quaternion"),
     "quaternion-of-zeros": (columns(TUM, lambda w: [*w[:4], "0", "0", "0", "0"]), BAD_INPUT, "unit quaternion"),
     "utf-16": (TUM.encode("utf-16"), BAD_INPUT, "cannot be read as text"),
-    "commas-for-points": (TUM.replace(".", ","), BAD_INPUT, "line 1: could not convert"),
-    "a-word-for-a-time": (TUM.replace(ROWS[3].split()[0], "now", 1), BAD_INPUT, "line 4: could not convert"),
+    "commas-for-points": (TUM.replace(".", ","), BAD_INPUT, "is no number"),
+    "a-word-for-a-time": (TUM.replace(ROWS[3].split()[0], "now", 1), BAD_INPUT, "is no number"),
     "times-backwards": ("\n".join(reversed(ROWS)) + "\n", BAD_INPUT, "does not increase; sort"),
     "nothing-but-comments": ("# t x y z qx qy qz qw\n", BAD_INPUT, "no poses"),
 }  # fmt: skip

@@ -7,7 +7,6 @@ import re
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 import yaml
@@ -17,6 +16,7 @@ from hippodrome._folders import temporary_folder
 from hippodrome._output import one_line
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.authoring.network_notes import network_notes
+from hippodrome.eval.authoring.sources import KINDS, require_source, unknown_kind
 from hippodrome.eval.files.scenarios import PACKAGE, located
 from hippodrome.sim.driving_side import Choice
 from hippodrome.sim.map_import import KNOWN, import_map, is_foreign
@@ -29,7 +29,6 @@ from hippodrome.sim.types import Town
 from hippodrome.sim.value_words import SCENARIO_NAME
 from hippodrome.sim.yaml_file import ScenarioError, load_yaml
 
-KINDS: Final = ("rural", "grid", "radial", "random")
 TOUR_SHARE = 1.3  # length of the mapping tour over that of the drivable roads: all of them once, and 40 % seen before
 TOUR_M = (1500.0, 7200.0)  # limits of the mapping tour: shorter ones close too few loops; the upper end is the paper's drive
 LOCALIZATION_SHARE = 1 / 3  # length of the second drive's tour over that of the mapping tour
@@ -93,6 +92,7 @@ def new_scenario(name: str, source: str, path: Path, driving_side: Choice = "aut
             f"'{name}': not a scenario's name, which folders are given: letters, digits, '.', '_', '-', "
             "a letter or digit first, at most 64; name it so, and the file as you like with --out"
         )
+    require_source(source)
     if around and source in KINDS:
         raise HippodromeError(f"--around {around.first:g},{around.second:g}: '{source}' is generated; only a map is cut out of")
     network = path.with_name(f"{path.stem}.net.xml.gz") if around or _is_imported(source) else None
@@ -201,7 +201,7 @@ def _town(source: str, imported: Path | None, folder: Path, driving_side: Choice
     if not network.is_file():
         raise HippodromeError(f"--from {source}: neither a kind of town ({', '.join(KINDS)}) nor a file")
     if not network.name.lower().endswith(KNOWN):
-        raise HippodromeError(f"--from {source}: unknown kind of map; there are {', '.join(KNOWN)}")
+        raise unknown_kind(source, network)
     try:
         return build_town(TownSpec(network=network.resolve(), driving_side=driving_side), 1, folder)
     except HippodromeError as error:

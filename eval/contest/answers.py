@@ -14,7 +14,7 @@ from hippodrome.core.types import CognitiveMap, FloatArray, LocalizationEstimate
 from hippodrome.eval.methods.protocol import Cost, Mapped, MethodError
 from hippodrome.eval.metrics.association import MAX_COORDINATE, check_trajectory
 from hippodrome.eval.results.model import Row
-from hippodrome.sim.key_words import first_fault
+from hippodrome.sim.key_words import faults_of, place_of
 
 # Figures of its map that a method may state itself; all other names of a row are ours to measure.
 STATED: Final = ("camera_frames", "keyframes", "vertices", "edges")
@@ -106,7 +106,8 @@ def _figures(given: Any, label: str) -> dict[str, Any]:
     try:
         Row(method=label, **figures)
     except ValidationError as error:
-        raise MethodError(f"{label}: its figure {first_fault(error, figures)}") from None
+        fault = faults_of(error, figures)[0]
+        raise MethodError(f"{label}: its figure '{place_of(fault.location)}': {fault.words}") from None
     return figures
 
 

@@ -28,6 +28,7 @@ from hippodrome.eval.methods.protocol import (
     Mapped,
     Maps,
     MethodError,
+    as_answers,
     as_estimate,
     as_mapped,
 )
@@ -224,6 +225,5 @@ def _observations(entry: Entry, drive: Recording, stretch: tuple[int, int] | Non
 
 def estimates_of(label: str, answers: Localizing) -> tuple[list[LocalizationEstimate], Cost | None]:
     """What ``localize`` gave, answer by answer; a method that yields them does its work here."""
-    if isinstance(answers, Localized):
-        return [as_estimate(answer, label) for answer in answers.answers], answers.cost
-    return [as_estimate(answer, label) for answer in answers], None
+    estimates = [as_estimate(answer, label) for answer in as_answers(answers, label)]
+    return estimates, answers.cost if isinstance(answers, Localized) else None

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from hippodrome.core import se2
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.contest.entry import BUILT_IN, GROUP, Added, Entry, entries_of, with_methods
 from hippodrome.eval.contest.perform import Performance, perform
@@ -22,6 +23,7 @@ from hippodrome.eval.metrics.alignment import find_alignment
 from hippodrome.eval.metrics.association import associate
 from hippodrome.eval.results.model import Row
 from hippodrome.eval.rivals.orbslam3.method import OrbSlam3
+from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.record import ROLES, RecordingPlan, record
 from hippodrome.sim.render.probe import require_gl
 from hippodrome.sim.scenario import DriveSpec, Scenario
@@ -35,6 +37,9 @@ WAY_M: Final = 250.0  # of each drive: about half a minute
 # there. Ours differ by less than 2.
 FRAME_FACTOR: Final = 5.0
 FRAME_LEAST_M: Final = 2.0  # and by this much at least: less is an error and not another frame
+# Median angle between headings and the way from pose to pose: ours are off by one or two degrees, in tight curves by ten.
+HEADING_RAD: Final = 0.7
+CHECK_LIMIT_S: Final = 600.0  # of time for a drive of half a minute, unless the method has one of its own
 SCALE: Final = (0.8, 1.25)  # metres per metre of a trajectory that says it is metric
 
 
@@ -67,7 +72,7 @@ def check(wanted: str | Added, out: Path) -> Iterator[Finding]:
     Raises:
         HippodromeError: There is no such method, or the drive cannot be made.
     """
-    scenario = with_methods(short_scenario(), [wanted] if isinstance(wanted, Added) else [])
+    scenario = with_methods(short_scenario(), [_limited(wanted)] if isinstance(wanted, Added) else [])
     entries = entries_of(scenario)
     entry = entries[-1] if isinstance(wanted, Added) else _ours(wanted, entries)
     yield Finding(True, f"{entry.method.label}: loads; it does {', '.join(entry.does)}, answers in frame '{entry.method.frame}'")
@@ -79,6 +84,14 @@ def check(wanted: str | Added, out: Path) -> Iterator[Finding]:
     materials = gather(scenario, out)
     once, again = (perform(materials, with_bases(entry, entries)) for _ in range(2))
     yield from findings(entry, materials, once, again)
+
+
+def _limited(wanted: Added) -> Added:
+    """The method with the limit of time of the check, unless it has one of its own."""
+    usual_s = MethodSpec.model_fields["time_limit_s"].default
+    if wanted.spec.time_limit_s != usual_s:
+        return wanted
+    return replace(wanted, spec=wanted.spec.model_copy(update={"time_limit_s": CHECK_LIMIT_S}))
 
 
 def short_scenario() -> Scenario:
@@ -107,6 +120,7 @@ def findings(entry: Entry, materials: Materials, once: Performance, again: Perfo
     if row.covered is not None and row.covered < 1.0:
         yield Finding(True, f"note: it has poses for {row.covered:.0%} of the drive; its row says so")
     yield _frame_finding(outcome, materials)
+    yield from _heading_finding(outcome)
     yield _repeated(outcome, again)
     yield from _cost(row, materials)
     if "localize" in entry.does:
@@ -135,6 +149,23 @@ def _frame_finding(outcome: Outcome, materials: Materials) -> Finding:
         return Finding(False, f"frame: it is {1.0 / fit.scale:.2f} times too large to be in metres; declare frame 'own'")
     aligned = f"aligned by '{ALIGNMENTS[frame]}'"
     return Finding(True, f"frame: off by {off_m:.2f} m in the mean, {aligned}; its scale is {1.0 / fit.scale:.2f}")
+
+
+def _heading_finding(outcome: Outcome) -> Iterator[Finding]:
+    """Whether the headings are those of a vehicle that drives ahead along its own trajectory; nothing if it does not move."""
+    poses = outcome.mapped.trajectory.poses
+    way = np.diff(poses[:, :2], axis=0)
+    moved = np.hypot(*way.T)
+    drives = moved > 0.5 * moved.mean()  # of a stretch that hardly moves, the direction says little
+    if not drives.any() or moved.mean() == 0.0:
+        return
+    course = np.arctan2(way[:, 1], way[:, 0])[drives]
+    off_rad = float(np.median(np.abs(se2.wrap(se2.wrap(poses[:-1, 2])[drives] - course))))
+    if off_rad > HEADING_RAD:
+        cure = "headings are in radians, counter-clockwise from x, and of the vehicle, which drives ahead"
+        words = f"heading: it is {np.degrees(off_rad):.0f} degrees off the direction of travel in the median: {cure}"
+        is_harmless = outcome.method.frame == "metric"  # a fit of the positions alone lays it on the truth
+        yield Finding(is_harmless, f"note: {words}" if is_harmless else words)
 
 
 def _repeated(outcome: Outcome, again: Performance) -> Finding:

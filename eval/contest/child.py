@@ -18,11 +18,11 @@ import numpy as np
 
 from hippodrome.core.types import FloatArray, Frame, HippodromeError, Observation
 from hippodrome.eval.contest.apart import DECLARE, LENGTH, Kept, Made, Sealed
-from hippodrome.eval.contest.declared import Declared, looked_at
+from hippodrome.eval.contest.declared import Declared, looked_at, require_as_declared
 from hippodrome.eval.contest.guard import left_by
 from hippodrome.eval.contest.loading import load_class, made_of
 from hippodrome.eval.methods.feed import Feed
-from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, MethodError, as_estimate, as_mapped
+from hippodrome.eval.methods.protocol import Cost, Given, Localized, Mapped, MethodError, as_answers, as_estimate, as_mapped
 from hippodrome.eval.programs.references import crash_of, printable
 
 
@@ -36,7 +36,9 @@ class Served:
     def __init__(self, made: Made, source: IO[bytes], sink: IO[bytes]) -> None:
         assert made.spec.class_ is not None
         self._label, self._source, self._sink = made.label, source, sink
-        self._runner = made_of(load_class(made.spec.class_), made.spec.config, None, made.label)
+        cls = load_class(made.spec.class_)
+        self._runner = made_of(cls, made.spec.config, None, made.label)
+        require_as_declared(self._runner, cls, made.spec, made.label)
         self._mapped: Mapped | None = None
 
     def map(self, given: Given) -> tuple[Mapped, bool]:
@@ -53,9 +55,9 @@ class Served:
         opened = _unsealed(given)
         mapped = self._mapped if self._mapped is not None else opened.mapped
         found = self._runner.localize(iter(feed), replace(opened, mapped=mapped))
+        answers = [as_estimate(one, self._label) for one in as_answers(found, self._label)]
         if isinstance(found, Localized):
-            return replace(found, answers=[as_estimate(one, self._label) for one in found.answers])
-        answers = [as_estimate(one, self._label) for one in found]
+            return replace(found, answers=answers)
         feed.settle()
         return Localized(answers, Cost(process_time() - began - feed.decoding_s, None, feed.step_cpu_s))
 

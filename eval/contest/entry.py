@@ -27,12 +27,13 @@ from hippodrome.eval.rivals.rows import NoAttractor, RatSlamMethod
 from hippodrome.sim.key_words import faults_of
 from hippodrome.sim.method_spec import MethodSpec
 from hippodrome.sim.scenario import Scenario
-from hippodrome.sim.value_words import METHOD_NAME
+from hippodrome.sim.value_words import CLASS, METHOD_NAME, PATTERNS
 
 # In the order of the tables. They are made and run as everybody's methods are.
 BUILT_IN: Final[tuple[type[Any], ...]] = (DeadReckoning, SemiMetric, RatSlamMethod, NoAttractor, TopometricPaper, Topometric)
 # Ours as well, that take part only where they are asked for, by their labels.
 OFFERED: Final = {OrbSlam3.label: f"{OrbSlam3.__module__}:{OrbSlam3.__qualname__}"}
+TRUTHS: Final = ("ground-truth.tum", "localization-ground-truth.tum")  # files beside those of the methods
 GROUP: Final = "hippodrome.methods"  # of entry points, by which an installed package makes its methods known
 
 
@@ -81,22 +82,39 @@ def parse_method(text: str) -> Added:
     Raises:
         ValueError: It is none of these; the message says what is expected.
     """
-    found = re.match(r"^([A-Za-z0-9][A-Za-z0-9 ._+(),-]{0,39})=(.*)$", text, re.DOTALL)
-    name, source = (found.group(1), found.group(2)) if found else (None, text)
+    name, source = _named(text)
     kind, _, rest = source.partition(":")
     if not rest:
-        installed = OFFERED | {point.name: point.value for point in entry_points(group=GROUP)}
-        if source not in installed:
-            names = ", ".join(sorted(installed))
-            raise ValueError(
-                f"'{source}' is neither module:Class, exec:COMMAND nor stream:COMMAND, nor an installed method ({names})"
-            )
-        name, source = name or source, installed[source]
+        name, source = name or source, _installed(source)
     try:
         spec = MethodSpec.model_validate(source)
     except ValidationError as error:
         raise ValueError(f"'{text}': {faults_of(error, source)[0].words}") from None
     return Added(name or (_program_name(rest) if kind in ("exec", "stream") else None), spec)
+
+
+def _named(text: str) -> tuple[str | None, str]:
+    """Name and source of ``NAME=SOURCE``; None: it has no name. Raises ValueError if what stands for a name is none."""
+    before, equals, source = text.partition("=")
+    if not equals or ":" in before:  # the = is a part of a command
+        return None, text
+    if re.fullmatch(METHOD_NAME.strip("^$"), before) is None:
+        raise ValueError(f"'{text}': '{before}' is no name of a method: {PATTERNS[METHOD_NAME]}")
+    return before, source
+
+
+def _installed(name: str) -> str:
+    """The class of a method that comes with hippodrome, or that an installed package makes known. Raises ValueError."""
+    installed = [*OFFERED.items(), *((point.name, point.value) for point in entry_points(group=GROUP))]
+    found = sorted({value.partition("[")[0].replace(" ", "") for other, value in installed if other == name})
+    if not found:
+        names = ", ".join(sorted({other for other, _ in installed}))
+        raise ValueError(f"'{name}' is neither module:Class, exec:COMMAND nor stream:COMMAND, nor an installed method ({names})")
+    if len(found) > 1:
+        raise ValueError(f"'{name}' is the name of several installed methods; name one by its class: {', '.join(found)}")
+    if not re.fullmatch(CLASS.strip("^$"), found[0]):
+        raise ValueError(f"'{name}': its package makes '{found[0]}' known as a method, which is no my_package.my_module:MyClass")
+    return found[0]
 
 
 def as_option(name: str, spec: MethodSpec) -> str:
@@ -170,7 +188,7 @@ def _needs(spec: MethodSpec) -> Needs:
 
 
 def _card(label: str, frame: str) -> Method:
-    if not re.match(METHOD_NAME, label):
+    if not re.fullmatch(METHOD_NAME.strip("^$"), label):
         raise MethodError(f"method '{label}': this cannot be its name: letters, digits, blanks and . _ + ( ) , - up to 40")
     if frame not in ALIGNMENTS:
         raise MethodError(f"method {label}: frame '{frame}' is unknown; use one of {', '.join(ALIGNMENTS)}")
@@ -186,13 +204,18 @@ def _entry_of(declared: Declared, method: Method, runner: Any, source: str) -> E
 
 
 def _require_names(entries: Iterable[Entry]) -> None:
-    """Raise MethodError if two entries have one name, or the name of a row that ORB-SLAM3 has, or build on nothing."""
-    entries, taken = list(entries), set[str]()
+    """Raise MethodError if two entries have one name, or files of one name, or a name that ORB-SLAM3 has, or build on nothing."""
+    entries, taken, files = list(entries), set[str](), dict.fromkeys(TRUTHS, "the truth")
     reserved = {method.stem for method in METHODS} - {cls.card.stem for cls in BUILT_IN}
     for entry in entries:
-        if entry.method.stem in taken or (entry.method.stem in reserved and not isinstance(entry.runner, OrbSlam3)):
-            raise MethodError(f"method {entry.method.label}: there is one of this name already; give it another, NAME=...")
-        taken.add(entry.method.stem)
+        method, another = entry.method, "give it another name, NAME=..."
+        if taken & {method.stem, method.key} or (method.stem in reserved and not isinstance(entry.runner, OrbSlam3)):
+            raise MethodError(f"method {method.label}: there is one of this name already; {another}")
+        taken |= {method.stem, method.key}
+        own = {f"{method.stem}.tum", f"{method.stem}-localization.tum", *filter(None, [method.map_file])}
+        if same := sorted(own & set(files)):
+            raise MethodError(f"method {method.label}: its file {same[0]} would be that of {files[same[0]]}; {another}")
+        files |= dict.fromkeys(own, f"'{method.label}'")
     keys = [entry.method.key for entry in entries]
     for entry in entries:
         if entry.builds_on is not None and entry.builds_on not in keys:

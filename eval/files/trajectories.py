@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hippodrome._files import read_bounded, why_unreadable, write_atomically
+from hippodrome._output import one_line
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.metrics.association import TrajectoryError, check_trajectory
 
@@ -83,10 +84,7 @@ def read_lines(path: Path) -> list[str]:
 
 
 def _time(path: Path, number: int, line: str) -> float:
-    try:
-        return float(line.split()[0])
-    except (ValueError, IndexError) as error:
-        raise TrajectoryError(f"{path}: line {number}: {error}") from error
+    return _number(path, number, next(iter(line.split()), ""))
 
 
 def _trajectory(path: Path, rows: list[list[float]]) -> Trajectory:
@@ -101,14 +99,20 @@ def _trajectory(path: Path, rows: list[list[float]]) -> Trajectory:
 def _row(path: Path, number: int, line: str) -> list[float]:
     words = line.split()
     if len(words) != COLUMNS:
-        raise TrajectoryError(f"{path}: line {number}: {len(words)} columns, expected {COLUMNS} (t x y z qx qy qz qw)")
-    try:
-        values = [float(word) for word in words]
-    except ValueError as error:
-        raise TrajectoryError(f"{path}: line {number}: {error}") from error
+        cure = "; write spaces in place of commas" if line.count(",") >= COLUMNS - 1 else ""
+        raise TrajectoryError(f"{path}: line {number}: {len(words)} columns, expected {COLUMNS} (t x y z qx qy qz qw){cure}")
+    values = [_number(path, number, word) for word in words]
     if not 0.5 < sum(value * value for value in values[4:]) < 2.0:  # a unit quaternion, loosely: writers round
-        raise TrajectoryError(f"{path}: line {number}: qx qy qz qw is not a unit quaternion")
+        raise TrajectoryError(f"{path}: line {number}: qx qy qz qw is not a unit quaternion, whose squares add up to 1")
     return values
+
+
+def _number(path: Path, number: int, word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        cure = "; numbers have a point, as 1.5" if "," in word else "; a heading begins with #" if number == 1 else ""
+        raise TrajectoryError(f"{path}: line {number}: '{one_line(word)[:40]}' is no number{cure}") from None
 
 
 def _heading(quaternions: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
@@ -30,6 +31,10 @@ from hippodrome.core.types import (
     Trajectory,
 )
 from hippodrome.sim.render.camera import CameraSpec
+
+COLUMNS = 4  # of a pose with its time
+POSES_WANTED = "return a Trajectory, or yield (t_s, x, y, heading_rad) one by one"
+ANSWERS_WANTED = "yield one Answer(t_s, x_m, y_m, heading_rad) per observation, with localized=False where it does not know"
 
 TimedPose: TypeAlias = tuple[float, float, float, float]  # t_s, x, y, heading_rad
 
@@ -176,19 +181,46 @@ def as_mapped(answer: Mapping, label: str) -> Mapped:
     if isinstance(answer, Trajectory):
         return Mapped(answer)
     if not isinstance(answer, Iterable):
-        raise MethodError(
-            f"{label}: map() gave a {type(answer).__name__}; return a Trajectory, or yield (t_s, x, y, heading_rad) one by one"
-        )
+        raise MethodError(f"{label}: map() gave {_kind(answer)}{_why(answer)}; {POSES_WANTED}")
     poses = list(answer)  # a method that yields its poses does its work here, and what it raises is its own
-    try:
-        table = np.array([tuple(map(float, pose)) for pose in poses], dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise MethodError(
-            f"{label}: map() gave no trajectory ({error}); return a Trajectory, or yield (t_s, x, y, heading_rad) one by one"
-        ) from None
-    if table.ndim != 2 or table.shape[1] != 4:
-        raise MethodError(f"{label}: map() gave no poses; return a Trajectory, or yield (t_s, x, y, heading_rad) one by one")
+    table = np.array([_timed(pose, number, label) for number, pose in enumerate(poses)], dtype=np.float64)
+    if len(table) == 0:
+        raise MethodError(f"{label}: map() gave no poses; {POSES_WANTED}")
     return Mapped(Trajectory(table[:, 0], table[:, 1:]))
+
+
+def _timed(pose: Any, number: int, label: str) -> tuple[float, ...]:
+    """A pose that ``map`` gave, as four numbers. Raises MethodError if it is none."""
+    where = f"{label}: map() gave no trajectory: its pose {number} is"
+    if not isinstance(pose, Iterable) or isinstance(pose, str | bytes | dict):
+        raise MethodError(f"{where} {_kind(pose)}; {POSES_WANTED}")
+    values = list(islice(pose, COLUMNS + 1))
+    if len(values) != COLUMNS:
+        raise MethodError(f"{where} of {'more than 4' if len(values) > COLUMNS else len(values)} values; {POSES_WANTED}")
+    try:
+        return tuple(float(one) for one in values)
+    except (TypeError, ValueError, OverflowError):
+        kinds = ", ".join(type(one).__name__ for one in values)
+        raise MethodError(f"{where} not made of numbers ({kinds}); {POSES_WANTED}") from None
+
+
+def as_answers(found: Any, label: str) -> Iterable[Answer | LocalizationEstimate]:
+    """What ``localize`` returned, as answers one by one. Raises MethodError if it is nothing of the kind."""
+    if isinstance(found, Localized):
+        return as_answers(found.answers, label)
+    if not isinstance(found, Iterable) or isinstance(found, str | bytes | dict):
+        raise MethodError(f"{label}: localize() gave {_kind(found)}{_why(found)}; {ANSWERS_WANTED}")
+    return found
+
+
+def _kind(value: Any) -> str:
+    """What a value is, in a word."""
+    return "None" if value is None else f"a {type(value).__name__}"
+
+
+def _why(value: Any) -> str:
+    """How a function comes to give None."""
+    return ", as a function does that has no return and no yield" if value is None else ""
 
 
 def as_estimate(answer: Answer | LocalizationEstimate, label: str) -> LocalizationEstimate:
@@ -196,12 +228,12 @@ def as_estimate(answer: Answer | LocalizationEstimate, label: str) -> Localizati
     if isinstance(answer, LocalizationEstimate):
         return answer
     if not isinstance(answer, Answer):
-        raise MethodError(f"{label}: localize() gave a {type(answer).__name__}; yield one Answer per observation")
+        raise MethodError(f"{label}: localize() gave {_kind(answer)} as an answer; {ANSWERS_WANTED}")
     try:
         pose = np.array([answer.x_m, answer.y_m, answer.heading_rad], dtype=np.float64)
         covariance = np.zeros((3, 3)) if answer.covariance is None else np.asarray(answer.covariance, dtype=np.float64)
         stands_by_it = bool(answer.localized)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise MethodError(f"{label}: localize() gave an Answer that is not made of numbers: {error}") from None
     if stands_by_it and not np.isfinite(pose).all():
         raise MethodError(f"{label}: localize() stands by a pose that is not finite, at t_s={answer.t_s}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import resource
 import shlex
 import shutil
@@ -31,6 +32,13 @@ LEAST_WORK: Final = 0.02  # share of a core: a program that uses less of one for
 # Signals by which a program ends through a fault of its own. Not SIGKILL, by which the system ends it for want of memory.
 OWN_FAULTS: Final = {signal.SIGABRT, signal.SIGSEGV, signal.SIGFPE, signal.SIGBUS, signal.SIGILL}
 SHELL_SIGNAL: Final = 128  # a shell's status for a command that a signal ended is this and the signal's number
+# What a shell says by these statuses.
+NOT_RUN: Final = {
+    126: " (something that it runs may not be run: chmod +x it)",
+    127: " (something that it runs is not there: a program, or the interpreter that its first line names)",
+}
+# Words that mean something to a shell alone.
+OF_SHELLS: Final = frozenset({"|", "||", "&&", "&", ";", ">", ">>", "<", "2>", "2>&1", "1>", "&>"})
 CPU_CLOCK: Final = 2  # Linux: the low bits of the number of a process's clock of CPU time, all its threads together
 
 
@@ -163,7 +171,7 @@ class Process:
             how = f"wrote a file of more than {self.limits.file_bytes / 1e6:.0f} MB, the limit"
         elif self.status < 0:
             how = f"crashed: signal {-self.status} ({_signal_name(-self.status)})"
-        return f"{how}; its last words: {last_words(self.log)}"
+        return f"{how}{NOT_RUN.get(self.status, '')}; its last words: {last_words(self.log)}"
 
     def _ended(self, status: int, usage: resource.struct_rusage) -> None:
         self.popen.returncode = self.status = os.waitstatus_to_exitcode(status)
@@ -197,7 +205,12 @@ def started(
     temporary = folder / TEMPORARY
     with _appended(log, temporary) as stream:
         if shutil.which(command[0]) is None:
-            raise MethodError(f"there is no program '{command[0]}', or it may not be run; name it by a path, and chmod +x it")
+            cure = "name it by a path, and chmod +x it"
+            if re.fullmatch(r"\w+=.*", command[0]):
+                cure = f"variables are set by env: env {command[0]} ..."
+            elif command[0].startswith(("~", "$")):
+                cure = "no shell reads the command: write the path out"
+            raise MethodError(f"there is no program '{command[0]}', or it may not be run; {cure}")
         words, within = [str(word) for word in command], can_contain()
         if within:
             words = contained(words, concealed, limits.address_bytes, limits.file_bytes)
@@ -239,6 +252,8 @@ def command_words(text: str, **places: Path) -> list[str]:
         raise MethodError(f"'{text}' is not a command: {error}") from None
     if not words:
         raise MethodError("its command is empty")
+    if operators := [word for word in words if word in OF_SHELLS]:
+        raise MethodError(f"its command has '{operators[0]}', and no shell reads it; write it into a script, or use sh -c '...'")
     for name, path in places.items():
         words = [word.replace(f"{{{name}}}", str(path)) for word in words]
     return words

@@ -16,6 +16,7 @@ from hippodrome.eval.programs.environments import words_of
 from hippodrome.eval.programs.layouts import write_sequence
 from hippodrome.eval.programs.limits import Limits
 from hippodrome.eval.programs.process import Process, last_words, started
+from hippodrome.eval.programs.references import printable
 from hippodrome.sim.method_spec import MethodSpec
 
 TRAJECTORY: Final = "trajectory.tum"  # that a program leaves in its folder {out}
@@ -74,11 +75,12 @@ def read_answer(out: Path, process: Process, camera_ahead_m: float | None = None
     path = out / TRAJECTORY
     if path.resolve() != out.parent.resolve() / out.name / TRAJECTORY:
         raise MethodError(f"it left {TRAJECTORY} as a link, which is not followed: what it leads to need not be its own")
+    if path.exists() and not path.is_file():
+        raise MethodError(f"it left {TRAJECTORY} as something else than a file; a file of lines t x y z qx qy qz qw is expected")
     if not path.is_file():
         left = ", ".join(sorted(entry.name for entry in out.iterdir())[:5] if out.is_dir() else ()) or "nothing"
-        raise MethodError(
-            f"it ended with status 0 and left no {TRAJECTORY} in {{out}}, but {left}; its last words: {last_words(process.log)}"
-        )
+        words = f"it ended with status 0 and left no {TRAJECTORY} in {{out}}, but {printable(left)}"
+        raise MethodError(f"{words}; its last words: {last_words(process.log)}")
     try:
         return read_tum(path) if camera_ahead_m is None else read_camera_tum(path, camera_ahead_m)
     except HippodromeError as error:

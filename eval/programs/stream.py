@@ -9,6 +9,7 @@ import struct
 import termios
 import time
 from collections.abc import Iterator
+from itertools import takewhile
 from pathlib import Path
 from typing import Final
 
@@ -29,6 +30,10 @@ from hippodrome.sim.render.camera import CameraSpec
 VERSION: Final = 1
 MAX_MESSAGE_BYTES: Final = 64 << 20  # of a method's answer: the trajectory of a drive of a day
 CHUNK_BYTES: Final = 1 << 16
+# First bytes of messages: each holds one field, which is a message itself.
+TAGS: Final = frozenset(field.number << 3 | 2 for field in pb.FromMethod.DESCRIPTOR.fields)
+REPLACED: Final = "\ufffd"  # what Python makes of a byte that is no letter
+QUOTED: Final = 40  # bytes of what is no message that an error repeats
 LOOK_S: Final = 1.0  # between two looks at what memory a process that answers holds
 
 
@@ -120,8 +125,10 @@ class Line:
         try:
             answer = pb.FromMethod.FromString(body)
         except DecodeError:
-            raise MethodError(f"it sent {len(body)} bytes that are no message of proto/method_stream.proto") from None
-        if (kind := answer.WhichOneof("message")) != expected:
+            raise no_message(body) from None
+        if (kind := answer.WhichOneof("message")) is None:
+            raise MethodError(f"it sent an empty message where '{expected}' was expected; see proto/method_stream.proto")
+        if kind != expected:
             raise MethodError(f"it answered with '{kind}' where '{expected}' was expected; see proto/method_stream.proto")
         return answer
 
@@ -165,16 +172,25 @@ class Line:
             self._looked_s = now_s
             self._process.poll()
             if (cause := self._process.failure()) is not None:
-                raise self._process.error(cause)
+                raise self._process.error(cause + (self._why_silent() if cause.startswith("hung") else ""))
             if now_s - self._asked_s > LOOK_S and self._is_closed(writing):
                 self._gone()
+
+    def _why_silent(self) -> str:
+        """What may be the matter with a process that hung: most forget to give out what they have written."""
+        cure = "does it answer each message, and flush its output after each answer?"
+        return "" if self._unread() > 0 else f"; it had read all that it was sent, and was waiting: {cure}"
+
+    def _unread(self) -> int:
+        """Bytes that it was sent and has not read."""
+        count: int = struct.unpack("i", fcntl.ioctl(self._to, termios.FIONREAD, bytes(4)))[0]
+        return count
 
     def _is_closed(self, writing: bool) -> bool:
         """Whether the process closed a pipe that it still needs: for its answer, or for what it has not read yet."""
         if not writing and self._process.has_let_go(self._from):
             return True
-        unread = struct.unpack("i", fcntl.ioctl(self._to, termios.FIONREAD, bytes(4)))[0]
-        return (writing or unread > 0) and self._process.has_let_go(self._to)
+        return (writing or self._unread() > 0) and self._process.has_let_go(self._to)
 
     def _message(self) -> bytes | None:
         """The next whole message that has arrived."""
@@ -191,6 +207,8 @@ class Line:
                 raise MethodError("it sent what is no length of a message: are its messages preceded by theirs, as a varint?")
         if length > MAX_MESSAGE_BYTES:
             raise MethodError(f"it sent a message of {length} bytes, the limit is {MAX_MESSAGE_BYTES}")
+        if length > 0 and len(self._held) > place and self._held[place] not in TAGS:
+            raise no_message(self._held)  # said at once: the rest of what is taken for a message may never come
         if len(self._held) < place + length:
             return None
         body = bytes(self._held[place : place + length])
@@ -205,6 +223,16 @@ class Line:
         if (cause := self._process.failure()) is None and self._process.status is None:
             cause = f"it closed its standard input or output, and went on; its last words: {last_words(self._process.log)}"
         raise self._process.error(cause or f"it ended before the drive did; its last words: {last_words(self._process.log)}")
+
+
+def no_message(data: bytes | bytearray) -> MethodError:
+    """What is to be said of bytes on standard output that are no message; text there is what a program prints."""
+    start = bytes(data[:QUOTED]).decode(errors="replace").lstrip()
+    text = "".join(takewhile(lambda letter: letter.isprintable() and letter != REPLACED, start)).strip()
+    if len(text) > 1:
+        what = f"it wrote '{text}' on its standard output, which is no message of proto/method_stream.proto"
+        return MethodError(f"{what}: standard output is for messages alone; print on standard error")
+    return MethodError(f"it sent {len(data)} bytes that are no message of proto/method_stream.proto")
 
 
 def _varint(value: int) -> bytes:

@@ -52,6 +52,22 @@ def test_new_reads_openstreetmap_in_every_form(tmp_path, ending):
     assert read_scenario(path).town.network == path.parent / "block.net.xml.gz"
 
 
+def test_packed_or_not_is_told_by_the_bytes_and_letters_by_the_declaration(tmp_path):
+    """Browsers unpack what they fetch and leave its name; old exports have Latin letters in bytes of their own."""
+    street = BLOCK.replace('v="residential"/>', 'v="residential"/><tag k="name" v="Gr\xfcnstra\xdfe"/>')
+    (tmp_path / "a.osm").write_text(BLOCK)
+    (tmp_path / "b.osm.gz").write_text(BLOCK)
+    (tmp_path / "c.osm").write_bytes(gzip.compress(BLOCK.encode()))
+    (tmp_path / "d.osm").write_bytes(street.replace("?>", ' encoding="ISO-8859-1"?>', 1).encode("latin-1"))
+    (tmp_path / "e.osm").write_bytes(b"\xef\xbb\xbf" + street.encode())
+    made = [tmp_path / f"{letter}.net.xml.gz" for letter in "abcde"]
+    for net_file in made:
+        import_map(next(one for one in tmp_path.glob(f"{net_file.name[0]}.osm*")), net_file)
+    assert made[0].read_bytes() == made[1].read_bytes() == made[2].read_bytes()
+    for net_file in made[3:]:
+        assert "Gr\xfcnstra\xdfe" in gzip.decompress(net_file.read_bytes()).decode()
+
+
 def test_new_reads_opendrive(tmp_path):
     """A generated town written as OpenDRIVE by netconvert, and read again, is as long as it was."""
     town = build_town(TownSpec(kind="grid", width_m=190, height_m=190, road_km=1.3), 1, tmp_path)
@@ -85,10 +101,10 @@ def test_a_bomb_is_refused(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("name", "content", "reason"), [
     ("a.osm", b"hello", "cannot be imported"),
-    ("a.osm", b"<osm/>", "cannot be imported|no roads|no lane|not a"),
-    ("a.osm.gz", b"hello", "cannot be read"),
+    ("a.osm", b"<osm/>", "no roads"),
+    ("a.osm.gz", b"hello", "cannot be imported"),
     ("a.osm.pbf", b"hello", "cannot be read"),
-    ("a.xodr", b"<osm/>", "cannot be imported|no lane|no roads"),
+    ("a.xodr", b"<osm/>", "cannot be imported"),
     ("a.net.xml", b"hello", "not a SUMO network"),
     ("a.kml", b"hello", "unknown kind of map; there are .net.xml"),
     ("lost.osm", None, "no such file"),

@@ -8,7 +8,7 @@ import pytest
 
 from hippodrome.core.types import HippodromeError, Trajectory
 from hippodrome.eval.contest.answers import numbers, sound_cost, sound_estimates, sound_map
-from hippodrome.eval.methods.protocol import Answer, Cost, Mapped, as_estimate, as_mapped
+from hippodrome.eval.methods.protocol import Answer, Cost, Localized, Mapped, as_answers, as_estimate, as_mapped
 
 T_S, POSES = np.arange(4.0), np.zeros((4, 3))
 
@@ -95,6 +95,40 @@ def test_who_is_not_localized_needs_no_pose():
 def test_an_answer_that_is_not_made_of_numbers_is_a_sentence(odd):
     with pytest.raises(HippodromeError, match="mine: localize"):
         as_estimate(replace(Answer(1.0, 0.0, 0.0, 0.0), **odd), "mine")
+
+
+@pytest.mark.parametrize(
+    ("given", "cause"),
+    [
+        (None, "map.. gave None, as a function does that has no return and no yield; return a Trajectory, or yield"),
+        (3, "map.. gave a int; return a Trajectory"),
+        ([], "map.. gave no poses"),
+        ("abcd", "its pose 0 is a str"),
+        ({"t_s": 1.0}, "its pose 0 is a str"),
+        ([(0.0, 1.0, 2.0)], "its pose 0 is of 3 values"),
+        ([(0.0, 1.0, 2.0, 3.0), (1.0, 2.0)], "its pose 1 is of 2 values"),
+        ((T_S, POSES), "its pose 1 is not made of numbers"),
+        ((np.arange(9.0), np.zeros((9, 3))), "its pose 0 is of more than 4 values"),
+        ([(0.0, 1.0, 2.0, None)], r"its pose 0 is not made of numbers \(float, float, float, NoneType\)"),
+        ([None], "its pose 0 is None"),
+        ([(0.0, 1.0, 2.0, 10**400)], "its pose 0 is not made of numbers"),
+    ],
+)
+def test_whatever_map_gives_is_a_trajectory_or_a_sentence(given, cause):
+    with pytest.raises(HippodromeError, match=f"mine: {cause}|mine: map.. gave no trajectory: {cause}"):
+        as_mapped(given, "mine")
+
+
+@pytest.mark.parametrize("given", [None, 3, "abc", {"a": 1}, Answer(0.0, 0.0, 0.0, 0.0), Localized(None, Cost(0.0))])
+def test_whatever_localize_gives_is_answers_or_a_sentence(given):
+    with pytest.raises(HippodromeError, match=r"mine: localize.. gave .*; yield one Answer"):
+        as_answers(given, "mine")
+
+
+@pytest.mark.parametrize("given", [None, (0.0, 1.0, 2.0, 3.0), 1.0, np.zeros(4)])
+def test_whatever_stands_for_an_answer_is_one_or_a_sentence(given):
+    with pytest.raises(HippodromeError, match=r"mine: localize.. gave .* as an answer; yield one Answer"):
+        as_estimate(given, "mine")
 
 
 def test_numbers_are_real():

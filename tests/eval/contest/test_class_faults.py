@@ -18,7 +18,7 @@ pytestmark = pytest.mark.usefixtures("entrants")
         ("Leaves", "it left the process with status 3"),
         ("Nan", "not finite"),
         ("Backwards", "does not increase"),
-        ("Nothing", "map() gave a NoneType"),
+        ("Nothing", "map() gave None, as a function does that has no return"),
         ("Words", "map() gave no trajectory"),
         ("Little", "cover"),
         ("Odd", "'ape', which is measured here"),

@@ -45,6 +45,11 @@ def test_we_read_what_evo_writes(tmp_path):
     assert np.allclose(ours.poses, theirs.poses, atol=1e-9)
 
 
+def test_ends_of_lines_marks_and_comments_of_other_systems_are_read(tmp_path):
+    (tmp_path / "a.tum").write_bytes(b"\xef\xbb\xbf# t x y z qx qy qz qw\r\n0 1 2 0 0 0 0 1\r\n\r\n \t1\t1 2 0 0 0 0 1")
+    assert read_tum(tmp_path / "a.tum").t_s.tolist() == [0.0, 1.0]
+
+
 def test_a_quaternion_needs_no_exact_norm(tmp_path):
     (tmp_path / "a.tum").write_text("0 1 2 0 0 0 0.7 0.7\n")
     assert read_tum(tmp_path / "a.tum").poses[0].tolist() == [1.0, 2.0, pytest.approx(np.pi / 2)]
@@ -56,7 +61,11 @@ def test_a_quaternion_needs_no_exact_norm(tmp_path):
         ("", "no poses"),
         ("# only a comment\n", "no poses"),
         ("0 1 2 3\n", "line 1: 4 columns, expected 8"),
-        ("# t\n0 1 2 0 0 0 0 one\n", "line 2: could not convert"),
+        ("# t\n0 1 2 0 0 0 0 one\n", "line 2: 'one' is no number"),
+        ("t x y z qx qy qz qw\n0 1 2 0 0 0 0 1\n", "line 1: 't' is no number; a heading begins with #"),
+        ("0,1,2,0,0,0,0,1\n", "line 1: 1 columns, expected 8 .*; write spaces in place of commas"),
+        ("0,1 1 2 0 0 0 0 1\n", "line 1: '0,1' is no number; numbers have a point, as 1.5"),
+        ("0 1 2 0 0 0 0 1\n\n1 1 2 0 0 0 0 \x1b[31m1\n", "line 3: '.31m1' is no number$"),
         ("0 1 2 0 0 0 0 0\n", "line 1: qx qy qz qw is not a unit quaternion"),
         ("0 nan 2 0 0 0 0 1\n", "sample 0 is not finite"),
         ("1 1 2 0 0 0 0 1\n0 1 2 0 0 0 0 1\n", "does not increase"),

@@ -115,6 +115,17 @@ class Localizer:
         """How long a unit of this drive's self-motion is believed to be; what is expected beforehand, until views tell."""
         return math.exp(self._belief.log_scale)
 
+    def looks_at(self, observation: Observation) -> bool:
+        """Whether ``step`` looks at the frame of the next observation. If not, the answers are the same without that frame.
+
+        Args:
+            observation: the next one, with its frame or without.
+        """
+        if self._odometry is not None or (self._road is not None and competes(self._belief)):
+            return True
+        steps = self._config.steps
+        return self._match is None or keyframes.is_due(keyframes.advance(self._view_change, observation, steps), steps)
+
     def step(self, observation: Observation) -> LocalizationEstimate:
         """Take one observation in and return the estimate at its time.
 

@@ -49,7 +49,7 @@ def draw_localization_error(
     for chosen, colour, label in (
         (localized & ~wrong, GREEN, "localized"),
         (wrong, VERMILION, "false fix"),
-        (~localized, FAINT, "lost"),
+        (~localized, FAINT, "not localized"),
     ):
         _bands(axes, t_s, chosen, colour, label)
     axes.plot(t_s, np.maximum(errors_m, FLOOR_M), color=TRUTH, linewidth=1.0, label="error")

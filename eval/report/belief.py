@@ -5,7 +5,7 @@ The belief is sampled: often in the first seconds, in which the localizer finds 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final
@@ -18,7 +18,7 @@ from hippodrome._files import write_atomically
 from hippodrome.core.attractors.grid_cells import module_periods
 from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.localization.localizer import Localizer
-from hippodrome.core.types import CognitiveMap, FloatArray, IntArray, LocalizationEstimate, Trajectory
+from hippodrome.core.types import CognitiveMap, FloatArray, IntArray, LocalizationEstimate, Observation, Trajectory
 from hippodrome.eval.methods.materials import Materials, Outcome
 from hippodrome.eval.methods.method import TOPOMETRIC, Method
 from hippodrome.eval.methods.stages import localize_recording
@@ -190,11 +190,20 @@ def _as_printed(materials: Materials, localized: Mapping[Method, Outcome]) -> tu
     if outcome is None or not isinstance(outcome.refined, CognitiveMap) or config.mode == "paper":
         return None
     printed = replace(config, mode="paper")
-    made = localize_recording(materials.drive.observations(), Localizer(outcome.refined, materials.roads, printed))
+    localizer = Localizer(outcome.refined, materials.roads, printed)
+    made = localize_recording(_looked_at(materials.drive, localizer), localizer)
     truth = materials.drive.ground_truth()
     score = score_localization(made.estimates, truth, made.step_s)
     belief = belief_of(AS_PRINTED, made.estimates, truth, outcome.refined, _periods_m(printed), TOPOMETRIC.label)
     return belief, Row(method=AS_PRINTED, localization=summarize_localization(score))
+
+
+def _looked_at(drive: Recording, localizer: Localizer) -> Iterator[Observation]:
+    """The observations of a drive, with those frames alone that a localizer looks at as it goes: the others are not decoded."""
+    for step, number in enumerate(drive.samples.frame):
+        observation = drive.samples.observation(step, None)
+        wanted = number >= 0 and localizer.looks_at(observation)
+        yield replace(observation, frame=drive.frame(int(number))) if wanted else observation
 
 
 def worst_steps(belief: Belief) -> list[int]:

@@ -38,7 +38,7 @@ function makeChart(canvas, story) {
       on.fillStyle = inks.soft;
       if (i && partOf(segments[i - 1].kind) === part) return seconds(on, one); // the part has its name already
       const words = partWords(one), room = X(segments.filter((other) => partOf(other.kind) === part).at(-1).s1) - X(one.s0);
-      const fitting = [words, words.split(" ", 2).join(" "), words.match(/^\d?/)[0]].find((text) => on.measureText(text).width < room - 4);
+      const fitting = [words, words.match(/^\d?/)[0]].find((text) => on.measureText(text).width < room - 4);
       if (fitting) on.fillText(fitting, X(one.s0) + 3, 8);
       seconds(on, one);
     });

@@ -113,12 +113,16 @@ def data_uri(media_type: str, content: bytes) -> str:
 
 
 def read_picture(path: Path) -> Picture | None:
-    """The figure as WebP, which takes a third of the PNG's size; without loss unless that is large. None if it is no picture."""
+    """The figure as WebP, which takes a third of the PNG's size; without loss unless that is large. None if it is no picture.
+
+    Photographs are not even tried without loss, which takes half of the page's time and ends in a file that is too large.
+    """
     image = cv2.imdecode(np.frombuffer(_bytes(path), np.uint8), cv2.IMREAD_COLOR)
     if image is None:
         return None
-    _, coded = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, LOSSLESS])
-    if len(coded) > LOSSLESS_BYTES:
+    is_photo = path.stem in PHOTOS
+    coded = None if is_photo else cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, LOSSLESS])[1]
+    if coded is None or len(coded) > LOSSLESS_BYTES:
         _, coded = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, PHOTO_QUALITY])
     height, width = image.shape[:2]
     return Picture(
@@ -127,7 +131,7 @@ def read_picture(path: Path) -> Picture | None:
         width,
         height,
         _packed(path.with_suffix(".svg")),
-        path.stem in PHOTOS,
+        is_photo,
     )
 
 

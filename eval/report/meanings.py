@@ -35,7 +35,9 @@ MEANINGS: Final = {  # by the begin of a head, without its unit; of several that
              "first declaration within 20 m of the truth on; steps in doubt are left out",
     "Error p95": "the error that 95 of 100 of the same steps stay below",
     "First fix": "how long, and how far, the second drive went until it was first declared localized within 20 m of the truth",
-    "CPU of the first fix": "the computing time until then, from the first frame on, without loading the map",
+    "First fix (s driven)": "how long the second drive took until it was first declared localized within 20 m of the truth",
+    "First fix (m driven)": "how far the second drive went until it was first declared localized within 20 m of the truth",
+    "CPU of the first fix": "the computing time from the first frame to the first fix, without loading the map",
     "Localized": "the share of all steps of the second drive that were declared localized",
     "False fixes": "separate stretches of steps that were declared localized more than 20 m away from the truth",
 }  # fmt: skip

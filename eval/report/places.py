@@ -58,7 +58,7 @@ def _vertex(layer: Layer, vertex: int, evidence: MapEvidence, place: Place | Non
 def _vertex_facts(place: Place) -> list[str]:
     """What the map says of a vertex, a line each."""
     along = f", {place.position_m:.0f}{NBSP}m along it" if place.position_m is not None else ""
-    lane = f" to lane {place.lane}{along}" if place.lane is not None else ""
+    lane = f" to lane {_lane(place.lane)}{along}" if place.lane is not None else ""
     facts = [
         f"Matched{lane}." if place.status == "matched" else f"Nothing vouches for this place: road match {place.status}{lane}."
     ]
@@ -71,10 +71,15 @@ def _vertex_facts(place: Place) -> list[str]:
         closed = "A loop is closed here" if is_here else f"The last loop was closed {far}"
         facts.append(f"{closed}, with the view stored at {place.closed_with_s:.1f}{NBSP}s.")
     if place.lanes:
-        facts.append(f"Other lanes: {', '.join(f'{one.lane} ({one.apart_m:.1f}{NBSP}m away)' for one in place.lanes)}.")
+        facts.append(f"Other lanes: {'; '.join(f'{_lane(one.lane)}, {one.apart_m:.1f}{NBSP}m away' for one in place.lanes)}.")
     near = [f"{'no truth there' if one.error_m is None else f'{one.error_m:.2f}{NBSP}m off'} ({one.apart_m:.1f}{NBSP}m away)"
             for one in place.neighbours]  # fmt: skip
     return [*facts, f"Other passes of this street: {', '.join(near)}." if near else "There is no other pass of this street."]
+
+
+def _lane(name: str) -> str:
+    """A lane's name; SUMO begins those inside junctions with a colon, which a reader may take for a slip."""
+    return f"{name} (in a junction)" if name.startswith(":") else name
 
 
 def _step(belief: Belief, step: int, frames: Thumbnails, evidence: MapEvidence, town: str, files: ScenarioFiles) -> Html:

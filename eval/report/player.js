@@ -121,7 +121,7 @@ function startPlayer(root) {
   }
 
   function caption(figure, words, t) {
-    find(`${figure} figcaption`).textContent = `${words} ${t.toFixed(1)} s`;
+    find(`${figure} figcaption`).textContent = `${words} ${t.toFixed(1)}\u00a0s`;
   }
 
   function play(on) {

@@ -33,6 +33,7 @@ MARKS = (  # sign, meaning, and the parts of the story in which it is seen
     ("own", "semi-metric map", "roads"),
     ("gap", "error now", "map made"),
     ("ramp", "laid on the roads, by error: 0.1 to 100 m", "roads made"),
+    ("vertex-dot", "place in the map", "find"),
     ("arrow", "believed car", "find"),
     ("located", "localized path", "find"),
     ("fix", "belief (95 %)", "find"),

@@ -25,10 +25,10 @@ GIVEN: Final = {  # by the mode of the refinement, else by the frame of a map
 }
 NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 SAME: Final = (
-    f"{SEMI_METRIC.label} and {NO_ATTRACTOR.label} have the same errors: loops are closed by views, and the steps between places "
-    "are those of the odometry, so that both maps have the same poses to the last bit. The attractor networks tell which way and "
-    "where the car is while it is localized (The brain at work, in a town's tab), not where the map's places lie; what they cost "
-    "is seen in CPU and size of the map."
+    f"\u201c{SEMI_METRIC.label}\u201d and \u201c{NO_ATTRACTOR.label}\u201d have the same errors: loops are closed by views, "
+    "and the steps between places are those of the odometry, so both maps have the same poses to the last bit. The attractor "
+    "networks tell which way and where the car is while it is localized (The brain at work, in a town's tab), not where its "
+    "map's places lie; what they cost is seen in CPU and size of the map."
 )
 
 

@@ -114,7 +114,7 @@ def _driven(scenario: ScenarioResult) -> str:
     network = scenario.network
     town = f"The road network {network.path}" if network.path is not None else f"A generated town of the kind {network.generator}"
     return (
-        f"{town}, with {network.km:.1f}{NBSP}km of road; seed {scenario.seed}, noise level {scenario.noise}. "
+        f"{town}, with {network.km:.1f}{NBSP}km of road; seed {scenario.seed}, noise level \u201c{scenario.noise}\u201d. "
         f"The first drive took {scenario.duration_s:,.0f}{NBSP}s and {scenario.frames:,} camera frames."
         + (f" Limits: {words}." if (words := limits_in_words(scenario)) else "")
     )
@@ -260,7 +260,7 @@ def _commands(scenario: ScenarioResult, evidence: MapEvidence | None) -> Html:
     others = [row.method for row in scenario.rows if row.method not in dict(commands)]
     note = "In the folder that holds this report. Stages take the road network as it is; noise levels that survey it wrongly " \
            "(realistic, harsh) are reproduced by eval only."  # fmt: skip
-    note += f" {'; '.join(others)}: with all rows only." if others else ""
+    note += f" Made again by the first command only: {'; '.join(others)}." if others else ""
     return joined(plain_table(["Row", "Command"], lines, "commands"), element("p", note, class_="note"))
 
 

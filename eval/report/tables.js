@@ -121,7 +121,15 @@ function tools(box, table, heads) {
   return said;
 }
 
+/** Mark a table with columns beyond its right edge, which nothing else betrays where scroll bars hide. */
+function showsMore(box) {
+  const look = () => box.classList.toggle("more", box.scrollLeft + box.clientWidth < box.scrollWidth - 1);
+  box.addEventListener("scroll", look, { passive: true });
+  new ResizeObserver(look).observe(box);
+}
+
 for (const box of document.querySelectorAll(".scroll")) {
+  showsMore(box);
   const table = box.querySelector("table");
   if (!table || table.tBodies[0].rows.length < MIN_ROWS) continue;
   const heads = headsOf(table);

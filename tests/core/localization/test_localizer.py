@@ -205,6 +205,19 @@ def test_same_input_same_answer(default_run):
     assert all(np.array_equal(a.pose, b.pose) for a, b in zip(default_run[0], again, strict=True))
 
 
+@pytest.mark.parametrize("mode", ["coupled", "paper"])
+def test_frames_that_are_not_looked_at_may_be_left_out(mode):
+    observations, _ = drive(PICTURES, np.random.default_rng(12), 137.0, 100.0, metres_per_unit=2.5)
+    localizer, looks, answers = Localizer(MAP, None, LocalizerConfig(mode=mode)), 0, []
+    for observation in observations:
+        looks += (looked := localizer.looks_at(observation))
+        answers.append(localizer.step(observation if looked else replace(observation, frame=None)))
+    assert 2 <= looks < len(observations)
+    for answer, whole in zip(answers, localize(observations, MAP, None, LocalizerConfig(mode=mode)), strict=True):
+        assert (answer.view_cell, answer.confidence, answer.status) == (whole.view_cell, whole.confidence, whole.status)
+        assert answer.pose.tobytes() == whole.pose.tobytes() and answer.covariance.tobytes() == whole.covariance.tobytes()
+
+
 def test_needs_a_map_in_the_network_frame():
     with pytest.raises(HippodromeError, match="semi-metric"):
         Localizer(replace(MAP, frame="semi-metric"), None, LocalizerConfig())

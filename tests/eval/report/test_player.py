@@ -99,7 +99,7 @@ def test_an_address_opens_a_time_of_the_second_drive(browser, report):
     half_axis_m = 2.4477 * np.sqrt(np.linalg.eigvalsh([[1.0, 0.2], [0.2, 2.0]])[-1])
     assert "Second drive, 40.0 s" in said["words"] and f"95 % sure within {half_axis_m:.2f} m" in said["words"]
     assert "truly 1.50 m off" in said["words"]
-    assert said["fired"] == "view of 30.0 s fired; kept frame of 30.0 s"
+    assert said["fired"] == "view of 30.0 s fired; kept frame of 30.0\u00a0s"
 
 
 WORDS = """const words = () => panel.querySelector(".moment").textContent, choice = panel.querySelector(".choice"),

@@ -153,7 +153,7 @@ def test_says_what_was_measured_quoted_failed_and_how_to_run_it_again(page):
     assert "hippodrome eval town/scenario.json --out again" in text
     assert "hippodrome localize town/topometric-default.pbstream recordings/town-localization-2" in text
     assert "--mode paper --start=1.000000,2.000000,90.000000" in text
-    assert "dead reckoning: with all rows only." in text
+    assert "Made again by the first command only: dead reckoning." in text
 
 
 def test_hostile_text_stays_text(page):

@@ -23,8 +23,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from hippodrome._output import terminal
-from hippodrome._processes import ENDING, die_with_parent, end_children
-from hippodrome._spawn import SpawnPool, hear_signals
+from hippodrome._processes import die_with_parent, end_children
+from hippodrome._spawn import ASKING, SpawnPool, hear_signals, signals_blocked
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.files.progress import Teller
 
@@ -155,10 +155,11 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _abandon(executor: ProcessPoolExecutor) -> None:
-    """End the processes in the middle of their tasks."""
-    executor.shutdown(wait=False, cancel_futures=True)
-    time.sleep(SETTLE_S)
-    end_children()
+    """End the processes in the middle of their tasks. A second signal comes after that, so that they can clear away."""
+    with signals_blocked(ASKING):
+        executor.shutdown(wait=False, cancel_futures=True)
+        time.sleep(SETTLE_S)
+        end_children()
 
 
 def progress_bar() -> Progress:
@@ -193,7 +194,7 @@ def _quiet_worker() -> None:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     one_opencv_thread()
-    for number in (signal.SIGINT, *ENDING):
+    for number in ASKING:
         if signal.getsignal(number) is not signal.SIG_IGN:  # a shell lets commands in the background ignore interrupts
             signal.signal(number, _leave)
     sys.stdout = sys.stderr
@@ -224,7 +225,7 @@ def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
     Nothing that follows may print either: a worker between two tasks may find a message in the queue that another one has left
     half read, and would complain.
     """
-    for number in (signal.SIGINT, *ENDING):
+    for number in ASKING:
         signal.signal(number, signal.SIG_IGN)  # a second one must not break off the clearing away
     sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115  # until the process ends
     raise SystemExit(INTERRUPTED)

@@ -43,12 +43,13 @@ def attempt_of(seed: int, number: int, dask: bool, baselines: bool = False) -> A
     return Attempt(command, target, name, float(np.random.default_rng([seed, number]).uniform(0.05, 1.0)))
 
 
-def kills(chaos: Chaos, seed: int, first: int, dask: bool, baselines: bool) -> Iterator[Disturbed]:
-    """Kills without end."""
+def kills(chaos: Chaos, seed: int, first: int, dask: bool, baselines: bool, only: str | None = None) -> Iterator[Disturbed]:
+    """Kills without end, of one command if ``only`` names it."""
     while True:
         attempt, name = attempt_of(seed, first, dask, baselines), f"kill-{first}"
-        what = f"{name}: {attempt.command}, {attempt.number} to {attempt.target} at {attempt.share:.0%}"
-        yield what, partial(chaos.killed, name, attempt)
+        if only in (None, attempt.command):
+            what = f"{name}: {attempt.command}, {attempt.number} to {attempt.target} at {attempt.share:.0%}"
+            yield what, partial(chaos.killed, name, attempt)
         first += 1
 
 
@@ -93,6 +94,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "--baselines", action="store_true", help="hit the command that runs ORB-SLAM3, too; installs it if need be"
     )
+    parser.add_argument("--only", choices=(*USUAL, "baselines"), help="kill this command alone (default: all)")
     parser.add_argument("--seconds", type=float, default=3600.0, help="after these nothing new is begun (default: 3600)")
     return parser.parse_args()
 
@@ -116,12 +118,12 @@ def _main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         chaos = Chaos(Path(folder))
         done = [
-            carried_out(kills(chaos, seed, first, dask, options.baselines), options.kills, end_s, tally),
-            carried_out(faults(chaos, seed, first), options.faults if mounts else 0, end_s, tally),
+            carried_out(kills(chaos, seed, first, dask, options.baselines, options.only), options.kills, end_s, tally),
             carried_out(pairs(chaos, seed, first), options.pairs, end_s, tally),
+            carried_out(faults(chaos, seed, first), options.faults if mounts else 0, end_s, tally),
         ]
         took = ", ".join(f"{command} {seconds:.0f} s" for command, seconds in chaos.took_s.items())
-    print(f"{sum(done)} disturbed runs ({done[0]} kills, {done[1]} faults, {done[2]} pairs), seed {seed}: {tally['fell']} fell; "
+    print(f"{sum(done)} disturbed runs ({done[0]} kills, {done[1]} pairs, {done[2]} faults), seed {seed}: {tally['fell']} fell; "
           + ", ".join(f"{tally[kind]} {words}" for kind, words in FAULTS.items())
           + f"; {tally['nobody']} signals met nobody; {chaos.compared:,} files compared; undisturbed: {took}")  # fmt: skip
     return 1 if tally["fell"] else 0

@@ -39,6 +39,16 @@ def pids_of(process, word, wanted):
     return found
 
 
+def gone(process):
+    """Whether nobody of its session is left after a few seconds; who is, is ended."""
+    end_s = time.monotonic() + 5.0
+    while (left := session(process.pid)) and time.monotonic() < end_s:
+        time.sleep(0.05)
+    for pid in left:
+        kill(pid, "SIGKILL")
+    return not left
+
+
 @pytest.mark.parametrize(("target", "name", "after_s", "status"), [
     ("all", "SIGHUP", 1.5, 129),  # the tracker did not ignore it
     ("all", "SIGKILL", 1.5, -signal.SIGKILL),  # nobody was left to take the names away
@@ -59,11 +69,24 @@ def test_a_signal_leaves_no_word_no_process_and_no_name(tmp_path, target, name, 
         said = process.communicate(timeout=LIMIT_S)[1]
     lines = [line for line in said.splitlines() if not re.fullmatch(r"\w+: \d of 4 done, \d+ s", line)]
     assert (process.returncode, lines) == (status, [])
-    end_s = time.monotonic() + 5.0
-    while session(process.pid) and time.monotonic() < end_s:
-        time.sleep(0.05)
-    assert session(process.pid) == []
+    assert gone(process)
     assert not list(Path("/dev/shm").glob(f"*hippodrome-test-{process.pid}*"))
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_second_signal_waits_for_no_task(tmp_path, name):
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    with subprocess.Popen([sys.executable, str(script), "600.0"], stderr=subprocess.PIPE, text=True, start_new_session=True,
+                          preexec_fn=with_default_signals) as process:  # fmt: skip
+        pids_of(process, b"spawn_main", 2)
+        time.sleep(0.5)
+        for _ in range(2):  # to the main process alone: the workers are asked by it, or die with it
+            kill(process.pid, name)
+            time.sleep(0.1)
+        said, number = process.communicate(timeout=LIMIT_S)[1], int(getattr(signal, name))
+    assert (process.returncode in (128 + number, -number), said) == (True, "")
+    assert gone(process)
 
 
 def _blocked():

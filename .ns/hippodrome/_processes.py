@@ -70,14 +70,14 @@ def dying_with_me() -> Callable[[], None]:
 def ending_like_an_interrupt() -> Iterator[None]:
     """Within the block the signals of ``ENDING`` raise ``Terminated``; a second one ends the process as it always did.
 
-    SIGINT raises ``KeyboardInterrupt``, as Python has it. Signals that are ignored, as ``nohup`` asks for, stay so. Only the main
-    thread can have it otherwise.
+    SIGINT raises ``KeyboardInterrupt``, as Python has it. Signals that are ignored, as ``nohup`` asks for, stay so. Only
+    the main thread can have it otherwise.
     """
     kept = {}
     with suppress(ValueError):  # not the main thread
         for number in (*ENDING, signal.SIGINT):
-            if signal.getsignal(number) == signal.SIG_DFL:
-                kept[number] = signal.signal(number, _raise_terminated if number in ENDING else signal.default_int_handler)
+            if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                kept[number] = signal.signal(number, _raise_once)
     try:
         yield
     finally:
@@ -98,6 +98,6 @@ def end_children(grace_s: float = GRACE_S) -> None:
         child.kill()
 
 
-def _raise_terminated(number: int, _frame: FrameType | None) -> NoReturn:
+def _raise_once(number: int, _frame: FrameType | None) -> NoReturn:
     signal.signal(number, signal.SIG_DFL)
-    raise Terminated(number)
+    raise KeyboardInterrupt if number == signal.SIGINT else Terminated(number)

@@ -15,6 +15,7 @@ import numpy as np
 
 from hippodrome._files import PACKAGE, code_sha256, sha256_of
 from hippodrome.core.types import Frame
+from hippodrome.sim.array_file import read_arrays, write_arrays
 from hippodrome.sim.drive import simulate_drive
 from hippodrome.sim.episode import Samples, draw_frame, sample_drive
 from hippodrome.sim.recording import (
@@ -26,10 +27,8 @@ from hippodrome.sim.recording import (
     chunk_count,
     chunk_path,
     open_recording,
-    read_arrays,
     read_samples,
     seal,
-    write_arrays,
     write_chunk,
 )
 from hippodrome.sim.render.camera import camera_divider

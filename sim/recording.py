@@ -7,21 +7,20 @@ absent, so a killed run continues where it was, and the bytes do not depend on h
 
 from __future__ import annotations
 
-import io
 import json
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 
 from hippodrome._files import read_bounded, replacing, sha256_of
 from hippodrome._json import parse_json
 from hippodrome.core.types import Frame, HippodromeError, Observation, Step, Trajectory
+from hippodrome.sim.array_file import read_arrays
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording_checks import MAX_FRAME_BYTES, check_samples, decoded_png, require_checksum, with_checksum
 
@@ -30,7 +29,6 @@ CHUNK_FRAMES = 250  # a few seconds of rendering: what a kill can cost at most, 
 PNG_LEVEL = 1  # fastest: level 3 saves 6 % of the space for twice the time
 MANIFEST = "manifest.json"
 MAX_MANIFEST_BYTES = 16 << 20  # a line for each quarter of a minute
-MAX_ARRAY_BYTES = 1 << 30  # of one file of arrays; a day at 10 Hz takes 80 MB
 ANEW = "delete the recording to make it anew"
 MAX_STEPS = 20_000_000  # refuse hostile sizes before memory is taken: 20 days at 11 Hz
 
@@ -113,12 +111,6 @@ def write_chunk(path: Path, first: int, frames: Iterator[tuple[Frame, ...]]) -> 
                 archive.writestr(zipfile.ZipInfo(frame_name(number, side)), png.tobytes())
 
 
-def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
-    """An npz archive (NumPy writes it with fixed dates: same arrays, same bytes)."""
-    with replacing(path) as temporary, temporary.open("wb") as stream:
-        np.savez(stream, **arrays)
-
-
 def read_samples(path: Path) -> Samples:
     """Samples back from disk, checked. Raises RecordingError."""
     try:
@@ -128,19 +120,6 @@ def read_samples(path: Path) -> Samples:
         raise RecordingError(f"{path}: not a readable sample file ({_said(error)}); {ANEW}") from None
     lane_ids = tuple(str(name) for name in arrays.pop("lane_ids"))
     return Samples(**arrays, lane_ids=lane_ids)
-
-
-def read_arrays(path: Path, names: list[str], optional: Sequence[str] = ()) -> dict[str, np.ndarray[Any, np.dtype[Any]]]:
-    """Arrays of an npz file that are stored as they are: a packed one could claim any size and is refused.
-
-    Those of ``optional`` are left out where the file has none.
-    """
-    blob = read_bounded(path, MAX_ARRAY_BYTES)
-    with zipfile.ZipFile(io.BytesIO(blob)) as archive:
-        if any(item.compress_type != zipfile.ZIP_STORED or item.file_size > len(blob) for item in archive.infolist()):
-            raise ValueError("packed arrays")
-    with np.load(io.BytesIO(blob), allow_pickle=False) as data:
-        return {name: data[name] for name in [*names, *(name for name in optional if name in data)]}
 
 
 def _said(error: Exception) -> str:

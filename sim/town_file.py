@@ -20,7 +20,7 @@ from hippodrome._files import PACKAGE, code_sha256, sha256_of
 from hippodrome._json import parse_json
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import FloatArray
-from hippodrome.sim.recording import read_arrays, write_arrays
+from hippodrome.sim.array_file import read_arrays, write_arrays
 from hippodrome.sim.types import Town
 
 LARGE_BYTES: Final = 8_000_000  # of a network's file: some 200 km; what is smaller is read within a second or two

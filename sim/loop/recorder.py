@@ -12,11 +12,12 @@ import numpy as np
 from hippodrome._files import PACKAGE, code_sha256, sha256_of
 from hippodrome.core.roads.network import RoadNetwork
 from hippodrome.core.types import Frame, HippodromeError
+from hippodrome.sim.array_file import write_arrays
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.loop.types import Event, Sensed, Truth
 from hippodrome.sim.loop.users import Users
 from hippodrome.sim.record import RECORDING_CODE, numpy_simd, write_drive
-from hippodrome.sim.recording import CHUNK_FRAMES, Recording, chunk_path, seal, write_arrays, write_chunk
+from hippodrome.sim.recording import CHUNK_FRAMES, Recording, chunk_path, seal, write_chunk
 from hippodrome.sim.scenario import Scenario
 from hippodrome.sim.types import Drive, TrafficLog
 

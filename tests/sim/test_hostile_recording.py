@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from hippodrome._files import sha256_of
+from hippodrome.sim.array_file import write_arrays
 from hippodrome.sim.episode import Samples
 from hippodrome.sim.recording import (
     MANIFEST,
@@ -20,7 +21,6 @@ from hippodrome.sim.recording import (
     open_recording,
     read_samples,
     seal,
-    write_arrays,
     write_chunk,
 )
 from hippodrome.sim.recording_checks import CHECKSUM, MAX_FRAME_BYTES, check_truth, decoded_png, with_checksum

@@ -8,17 +8,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from hippodrome.core.types import HippodromeError
+from hippodrome.sim.array_file import write_arrays
 from hippodrome.sim.episode import Samples
-from hippodrome.sim.recording import (
-    CHUNK_FRAMES,
-    chunk_count,
-    chunk_path,
-    open_recording,
-    read_samples,
-    seal,
-    write_arrays,
-    write_chunk,
-)
+from hippodrome.sim.recording import CHUNK_FRAMES, chunk_count, chunk_path, open_recording, read_samples, seal, write_chunk
 
 
 def make_samples(steps: int) -> Samples:

@@ -17,8 +17,9 @@ from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignFrame
 from hippodrome.eval.exchange.drives.images import decode
 from hippodrome.eval.exchange.drives.truth import TRUTH_FILE
+from hippodrome.sim.array_file import write_arrays
 from hippodrome.sim.episode import Samples
-from hippodrome.sim.recording import CHUNK_FRAMES, FORMAT, MANIFEST, chunk_count, chunk_path, write_arrays, write_chunk
+from hippodrome.sim.recording import CHUNK_FRAMES, FORMAT, MANIFEST, chunk_count, chunk_path, write_chunk
 from hippodrome.sim.recording_checks import with_checksum
 
 FOV_DEG: Final = (20.0, 150.0)  # fields of view that a camera of ours can have; others are left out as unknown

@@ -18,8 +18,9 @@ from hippodrome.eval.exchange.drives.exported import truth_of
 from hippodrome.eval.exchange.drives.lever import NO_LEVER, Ahead, at_axle, lever_of
 from hippodrome.eval.files.fixes import is_fix_file, read_fixes
 from hippodrome.eval.files.spatial import Axes, SpatialPoses, flatten, level, lifted, read_poses
+from hippodrome.sim.array_file import read_arrays, write_arrays
 from hippodrome.sim.georeference import GeoReference, read_georeference
-from hippodrome.sim.recording import Recording, RecordingError, read_arrays, write_arrays
+from hippodrome.sim.recording import Recording, RecordingError
 from hippodrome.sim.recording_checks import check_truth
 
 TRUTH_FILE: Final = "truth.npz"

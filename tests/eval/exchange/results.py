@@ -11,8 +11,9 @@ from hippodrome.core.types import Trajectory
 from hippodrome.eval.cli import main
 from hippodrome.eval.files.trajectories import write_tum
 from hippodrome.proto.codec import save_map
+from hippodrome.sim.array_file import write_arrays
 from hippodrome.sim.episode import Samples
-from hippodrome.sim.recording import Recording, chunk_path, seal, write_arrays, write_chunk
+from hippodrome.sim.recording import Recording, chunk_path, seal, write_chunk
 from hippodrome.sim.render.camera import CameraSpec
 from hippodrome.sim.town import build_town
 from hippodrome.sim.town_spec import TownSpec

@@ -166,8 +166,17 @@ class Line:
             self._process.poll()
             if (cause := self._process.failure()) is not None:
                 raise self._process.error(cause)
-            if now_s - self._asked_s > LOOK_S and self._is_closed(writing):
+            if now_s - self._asked_s > LOOK_S and self._is_closed(writing) and not self._said_more():
                 self._gone()
+
+    def _said_more(self) -> bool:
+        """Whether the process said something before it closed its pipe, after ``_wait`` had looked for it; it is kept."""
+        try:
+            data = os.read(self._from, CHUNK_BYTES)
+        except BlockingIOError:
+            return False
+        self._held += data
+        return bool(data)
 
     def _is_closed(self, writing: bool) -> bool:
         """Whether the process closed a pipe that it still needs: for its answer, or for what it has not read yet."""

@@ -206,8 +206,11 @@ class Chaos:
         """Kill one of two workers of a cluster; it starts another one, and the sweep goes on."""
         script = self.folder / "cluster.py"
         script.write_text(CLUSTER)
+        own = self.folder / "cluster-tmp"  # what Dask leaves there is its own affair
+        own.mkdir(exist_ok=True)
+        environment = {**self.environment(), "TMPDIR": str(own)}
         with subprocess.Popen([sys.executable, str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-                              stderr=subprocess.DEVNULL, start_new_session=True, env=self.environment()) as cluster:  # fmt: skip
+                              stderr=subprocess.DEVNULL, start_new_session=True, env=environment) as cluster:  # fmt: skip
             assert cluster.stdout is not None
             address, *pids = cluster.stdout.readline().split()
             started = self.start(attempt.command, out, "--scheduler", address)

@@ -12,7 +12,7 @@ from benchmarks.same.contents import LEFT_OUT
 # What a run of ORB-SLAM3 comes to differs from run to run, and belongs to the run that ended first.
 RANDOM: Final = re.compile(r"(^|/)orb-slam3(/|\.json$)")
 TEXTS: Final = (".md", ".html", ".txt", ".csv", ".svg")
-NUMBER: Final = re.compile(rb"\d+(\.\d+)?(e[+-]?\d+)?")
+NUMBER: Final = re.compile(rb"(<|&lt;)?\d+(\.\d+)?(e[+-]?\d+)?")  # "<0.001" is a time, too
 
 
 def differences(whole: Path, out: Path) -> list[str]:

@@ -84,7 +84,12 @@ def test_the_words_go_with_the_status(status, told, right):
 
 def test_files_are_compared_byte_by_byte_but_for_times(tmp_path):
     whole, out = tmp_path / "whole", tmp_path / "out"
-    texts = {"results.json": '{"ape": 1, "cpu_percent": 2}', "table1.md": "| 1.5 | 2 % |", "map.npz": "a", "orb-slam3.json": "1"}
+    texts = {
+        "results.json": '{"ape": 1, "cpu_percent": 2}',
+        "table1.md": "| 1.5 | <0.1 % |",
+        "map.npz": "a",
+        "orb-slam3.json": "1",
+    }
     for folder in (whole, out):
         folder.mkdir()
         for name, text in texts.items():

@@ -173,8 +173,17 @@ class Line:
             self._process.poll()
             if (cause := self._process.failure()) is not None:
                 raise self._process.error(cause + (self._why_silent() if cause.startswith("hung") else ""))
-            if now_s - self._asked_s > LOOK_S and self._is_closed(writing):
+            if now_s - self._asked_s > LOOK_S and self._is_closed(writing) and not self._said_more():
                 self._gone()
+
+    def _said_more(self) -> bool:
+        """Whether the process said something before it closed its pipe, after ``_wait`` had looked for it; it is kept."""
+        try:
+            data = os.read(self._from, CHUNK_BYTES)
+        except BlockingIOError:
+            return False
+        self._held += data
+        return bool(data)
 
     def _why_silent(self) -> str:
         """What may be the matter with a process that hung: most forget to give out what they have written."""

@@ -213,7 +213,7 @@ def _netconvert(source: Path, plain: Path, made: Path, options: tuple[str, ...])
     try:
         run_tool("netconvert", *files, *options, input_bytes=plain.stat().st_size)
     except HippodromeError as error:
-        if "No edges loaded" in str(error) or "No nodes loaded" in str(error):
+        if _says_it_is_empty(str(error)):
             return ()
         reason = str(error).replace(f"{plain.parent}/", "")  # the user knows no folder of ours
         raise HippodromeError(f"{source}: cannot be imported: {_with_cure(reason, log)}") from error
@@ -237,6 +237,12 @@ def _with_cure(reason: str, log: Path) -> str:
     if "Cannot read file" in reason:
         return f"{reason}: the map includes that file; put what is in it in the place of the <include>"
     return f"{reason}: correct this place of the map, or write it again with the tool that made it"
+
+
+def _says_it_is_empty(said: str) -> bool:
+    """Whether netconvert found no roads in a map, or nothing at all, and knows of no other cause."""
+    nothing_else = "Warning:" not in said and said.count("Error:") == 1
+    return "No edges loaded" in said or ("No nodes loaded" in said and nothing_else)
 
 
 def _has_roads(made: Path) -> bool:

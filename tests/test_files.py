@@ -36,6 +36,11 @@ def test_the_reason_of_an_unreadable_file_is_in_words_and_names_no_file(tmp_path
     assert _files.why_unreadable(OSError("not a regular file")) == "not a regular file"
     assert _files.why_unreadable(ValueError("two\nlines")) == "two lines"
     assert _files.why_unreadable(RecursionError()) == "RecursionError"
+    for data, words in ((b"a\xe9", "not UTF-8 text (byte 1); save it as UTF-8"), ("a".encode("utf-16"), "UTF-16 text; save"),
+                        (b"PK\x03\x04\xff", "packed by zip"), (b"\x1f\x8b\x08\xff", "packed by gzip; unpack it")):  # fmt: skip
+        with pytest.raises(UnicodeDecodeError) as told:
+            data.decode()
+        assert _files.why_unreadable(told.value).startswith(words)
 
 
 def test_an_error_leaves_what_was_there(tmp_path):

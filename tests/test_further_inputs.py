@@ -30,9 +30,9 @@ TRAJECTORIES = {
     "beyond-all-floats": (TUM.replace(ROWS[3].split()[1], "1e400", 1).encode(), BAD_INPUT, "position is not finite"),
     "one-long-line": (" ".join(TUM.split()).encode(), BAD_INPUT, "96 columns"),
     "nul-bytes": (TUM.replace("\n", "\0\n").encode(), BAD_INPUT, "is no number"),
-    "latin-1": (b"# caf\xe9\n" + TUM.encode(), BAD_INPUT, "cannot be read as text"),
+    "latin-1": (b"# caf\xe9\n" + TUM.encode(), BAD_INPUT, "cannot be read as text: not UTF-8 text .byte 5.; save it as UTF-8"),
     "hexadecimal": (TUM.replace("0.100 ", "0x1 ").encode(), BAD_INPUT, "is no number"),
-    "packed": (gzip.compress(TUM.encode()), BAD_INPUT, "cannot be read as text"),
+    "packed": (gzip.compress(TUM.encode()), BAD_INPUT, "cannot be read as text: packed by gzip; unpack it"),
 }  # fmt: skip
 # Tables of self-motion, and what is said of them.
 ODOMETRIES = {
@@ -43,7 +43,8 @@ ODOMETRIES = {
     "a-year-between": (HEADER + "0,5,0\n31536000,5,0\n", "comes 31536000.0 s after"),
     "a-million-million-a-second": (HEADER + "".join(f"{n * 1e-12:.15f},5,0\n" for n in range(1, 13)), "closer than any sensor"),
     "subnormal-speeds": (HEADER + ODOMETRY.replace("5.0", "5e-324"), "which no sensor tells from zero"),
-    "semicolons-and-commas": ((HEADER + ODOMETRY).replace(",", ";").replace(".", ","), "line 2: "),
+    "semicolons-and-commas": ((HEADER + ODOMETRY).replace(",", ";").replace(".", ","), "numbers have a point, as 1.5"),
+    "times-of-day": (HEADER + "12:00:01,5,0\n" + ODOMETRY, "times are seconds, not dates or times of day"),
 }
 FIXES = {
     "f.gpx": [(lambda text: re.sub("<time>.*?</time>", "", text), "12 track point.s. without a time"),
@@ -57,7 +58,7 @@ SCENARIOS = {
     "letters-of-another-alphabet": (TINY.replace("seed:", "s\u0435ed:"), "unknown key; did you mean seed"),
     "a-space-of-no-width": (TINY.replace("seed:", "seed\u200b:"), "unknown key; did you mean seed"),
     "an-anchor-of-5000-digits": ("x: &a " + 5000 * "9" + "\n" + TINY.replace("seed: 3", "seed: *a"), "5000 characters"),
-    "a-subnormal-rate": (TINY.replace("rate_hz: 5", "rate_hz: 5e-324"), "greater than or equal to 0.01"),
+    "a-subnormal-rate": (TINY.replace("rate_hz: 5", "rate_hz: 5e-324"), "must be a number of at least 0.01"),
     "a-merge-with-itself": ("a: &a\n  <<: *a\n" + TINY, "an alias stands for what it is a part of"),
     "itself-as-network": (TINY.replace("{kind: grid, width_m: 150, height_m: 150, road_km: 1.2}", "{network: a.yaml}"),
                           "not a SUMO network"),

@@ -127,15 +127,16 @@ def test_networks(made, tmp_path, capsys, name):
 
 MAPS = {
     "packed-twice.osm.gz": (gzip.compress(gzip.compress(BLOCK.encode())), ""),
-    "not-packed.osm.gz": (BLOCK.encode(), "cannot be read: Not a gzipped file"),
+    "not-packed.osm.gz": (BLOCK.encode(), ""),
+    "packed.osm": (gzip.compress(BLOCK.encode()), ""),
     "cut.osm.gz": (gzip.compress(BLOCK.encode())[:-20], "ended before the end-of-stream"),
-    "nodes-only.osm": (re.sub(r"<way.*</way>", "", BLOCK, flags=re.DOTALL).encode(), "No nodes loaded"),
+    "nodes-only.osm": (re.sub(r"<way.*</way>", "", BLOCK, flags=re.DOTALL).encode(), "holds no roads for cars"),
     "way-of-unknown-nodes.osm": (BLOCK.replace('<nd ref="', '<nd ref="9').encode(), "is not known"),
     "latitude-of-900.osm": (re.sub(r'lat="[^"]*"', 'lat="900"', BLOCK, count=1).encode(), "holds no roads for cars"),
     "all-in-one-place.osm": (re.sub(r'lon="[^"]*"', 'lon="1"', re.sub(r'lat="[^"]*"', 'lat="1"', BLOCK)).encode(), "only 1 node"),
-    "words.xodr": (b"hello", "invalid document structure"),
-    "empty.xodr": (b"<OpenDRIVE/>", "No nodes loaded"),
-    "net-in-disguise.osm": (b"<net version='1.20'/>", "No nodes loaded"),
+    "words.xodr": (b"hello", "it has no XML element; is it whole"),
+    "empty.xodr": (b"<OpenDRIVE/>", "holds no roads for cars"),
+    "net-in-disguise.osm": (b"<net version='1.20'/>", "it begins with <net>, and OpenStreetMap with <osm>"),
 }
 
 

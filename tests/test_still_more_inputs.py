@@ -141,7 +141,7 @@ FIELDS = {
     ),
     "words-for-a-seed": (lambda row: row.update(seed="three"), BAD_INPUT, "seed: must be a whole number"),
     "a-seed-of-a-half": (lambda row: row.update(seed=0.5), BAD_INPUT, "seed: must be a whole number"),
-    "a-key-of-nobody": (lambda row: row.update(nobody=1), BAD_INPUT, "nobody: Extra inputs"),
+    "a-key-of-nobody": (lambda row: row.update(nobody=1), BAD_INPUT, "nobody: unknown key"),
     "a-method-of-terminal-commands": (lambda row: row.update(method="\x1b]0;x\x07[red]"), DONE, "no worse"),
 }
 MAPS = {

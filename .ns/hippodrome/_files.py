@@ -110,11 +110,23 @@ def open_regular(path: Path) -> BufferedReader:
     return stream
 
 
+# What files begin with that are taken for text and are none, or text of another coding.
+MARKS: Final = {
+    b"\xff\xfe": "UTF-16 text; save it as UTF-8",
+    b"\xfe\xff": "UTF-16 text; save it as UTF-8",
+    b"\x1f\x8b": "packed by gzip; unpack it",
+    b"PK": "packed by zip, as workbooks are; unpack it, or save it as text",
+}
+
+
 def why_unreadable(error: Exception) -> str:
     """Why a file cannot be read, in words: the system's own for an ``OSError``, without its number and the name of the file.
 
     The caller's sentence has the name already, and "[Errno 2] No such file or directory: 'a/b'" would say it twice.
     """
+    if isinstance(error, UnicodeDecodeError):
+        marked = (words for mark, words in MARKS.items() if bytes(error.object[:4]).startswith(mark))
+        return next(marked, f"not UTF-8 text (byte {error.start}); save it as UTF-8")
     return (isinstance(error, OSError) and error.strerror) or " ".join(str(error).split()) or type(error).__name__
 
 

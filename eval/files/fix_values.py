@@ -68,7 +68,8 @@ def as_number(text: Any, where: str) -> float:
     try:
         return float(text)
     except (ValueError, TypeError, OverflowError):
-        raise TrajectoryError(f"{where}: '{str(text)[:40]}' is not a number") from None
+        cure = "; numbers have a point, as 1.5" if "," in str(text) else ""
+        raise TrajectoryError(f"{where}: '{str(text)[:40]}' is not a number{cure}") from None
 
 
 def hdop_note() -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from hippodrome._files import read_bounded, why_unreadable
+from hippodrome.eval.files.number_words import first_that_is_none, no_number
 from hippodrome.eval.files.trajectories import MAX_BYTES
 from hippodrome.eval.metrics.association import TrajectoryError
 
@@ -25,5 +26,5 @@ def row_of_numbers(path: Path, number: int, words: list[str], width: int) -> lis
         raise TrajectoryError(f"{path}: line {number}: {len(words)} columns, the lines before have {width}")
     try:
         return [float(word) for word in words]
-    except ValueError as error:
-        raise TrajectoryError(f"{path}: line {number}: {error}") from None
+    except ValueError:
+        raise TrajectoryError(f"{path}: line {number}: {no_number(first_that_is_none(words), number == 1)}") from None

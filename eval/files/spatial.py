@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from hippodrome.core.types import FloatArray, Trajectory
 from hippodrome.eval.files.directions import angle_deg, chords, turn_up
+from hippodrome.eval.files.number_words import first_that_is_none, no_number, with_commas
 from hippodrome.eval.files.rows import row_of_numbers, text_lines
 from hippodrome.eval.files.trajectories import HEAD
 from hippodrome.eval.metrics.alignment import DegenerateAlignment, umeyama
@@ -62,6 +63,7 @@ def read_poses(path: Path, axes: Axes | None = None, times: Path | None = None) 
     if width not in (8, 12):
         raise TrajectoryError(
             f"{path}: line {rows[0][0]}: {width} columns, expected 8 (TUM: t x y z qx qy qz qw) or 12 (KITTI, with --times)"
+            f"{with_commas(' '.join(rows[0][1]), 8)}"
         )
     table = np.array([row_of_numbers(path, number, words, width) for number, words in rows])
     if width == 12:
@@ -280,7 +282,7 @@ def _kitti(path: Path, table: FloatArray, axes: Axes, times: Path | None) -> Spa
         raise TrajectoryError(f"{times}: {len(stamps)} times for the {len(table)} poses of {path}")
     try:
         t_s = np.array([float(stamp) for stamp in stamps])
-    except ValueError as error:
-        raise TrajectoryError(f"{times}: {error}") from None
+    except ValueError:
+        raise TrajectoryError(f"{times}: {no_number(first_that_is_none(stamps))}") from None
     matrices = table.reshape(-1, 3, 4)
     return SpatialPoses(t_s, matrices[:, :, 3], matrices[:, :, :3], axes)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hippodrome._files import read_bounded, why_unreadable, write_atomically
-from hippodrome._output import one_line
 from hippodrome.core.types import FloatArray, Trajectory
+from hippodrome.eval.files.number_words import no_number, with_commas
 from hippodrome.eval.metrics.association import TrajectoryError, check_trajectory
 
 MAX_BYTES = 256 << 20  # about two million poses
@@ -99,7 +99,7 @@ def _trajectory(path: Path, rows: list[list[float]]) -> Trajectory:
 def _row(path: Path, number: int, line: str) -> list[float]:
     words = line.split()
     if len(words) != COLUMNS:
-        cure = "; write spaces in place of commas" if line.count(",") >= COLUMNS - 1 else ""
+        cure = with_commas(line, COLUMNS)
         raise TrajectoryError(f"{path}: line {number}: {len(words)} columns, expected {COLUMNS} (t x y z qx qy qz qw){cure}")
     values = [_number(path, number, word) for word in words]
     if not 0.5 < sum(value * value for value in values[4:]) < 2.0:  # a unit quaternion, loosely: writers round
@@ -111,8 +111,7 @@ def _number(path: Path, number: int, word: str) -> float:
     try:
         return float(word)
     except ValueError:
-        cure = "; numbers have a point, as 1.5" if "," in word else "; a heading begins with #" if number == 1 else ""
-        raise TrajectoryError(f"{path}: line {number}: '{one_line(word)[:40]}' is no number{cure}") from None
+        raise TrajectoryError(f"{path}: line {number}: {no_number(word, number == 1)}") from None
 
 
 def _heading(quaternions: FloatArray) -> FloatArray:

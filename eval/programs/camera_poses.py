@@ -8,6 +8,8 @@ import numpy as np
 
 from hippodrome.core import se2
 from hippodrome.core.types import FloatArray, HippodromeError, Trajectory
+from hippodrome.eval.files.number_words import with_commas
+from hippodrome.eval.files.rows import row_of_numbers
 from hippodrome.eval.files.trajectories import read_lines
 from hippodrome.eval.metrics.association import check_trajectory
 
@@ -26,13 +28,15 @@ def read_camera_tum(path: Path, forward_m: float) -> Trajectory:
     Raises:
         HippodromeError: The file is no trajectory.
     """
-    try:
-        lines = read_lines(path)
-        table = np.array([[float(word) for word in line.split()] for line in lines if line.strip()], dtype=np.float64)
-    except ValueError as error:
-        raise HippodromeError(f"{path}: not a trajectory: {error}") from None
-    if table.ndim != 2 or table.shape[1] != COLUMNS:
-        raise HippodromeError(f"{path}: no poses, or not {COLUMNS} columns a line (t x y z qx qy qz qw)")
+    rows = [(number, line.split()) for number, line in enumerate(read_lines(path), start=1) if line.strip()]
+    rows = [(number, words) for number, words in rows if not words[0].startswith("#")]
+    if not rows:
+        raise HippodromeError(f"{path}: no poses; a line for each is expected, t x y z qx qy qz qw")
+    for number, words in rows:
+        if len(words) != COLUMNS:
+            cure = with_commas(" ".join(words), COLUMNS)
+            raise HippodromeError(f"{path}: line {number}: {len(words)} columns, expected {COLUMNS} (t x y z qx qy qz qw){cure}")
+    table = np.array([row_of_numbers(path, number, words, COLUMNS) for number, words in rows], dtype=np.float64)
     table = table[np.concatenate([[True], np.diff(table[:, 0]) > 0.0])]
     body = body_poses(table[:, 1:4], table[:, 4:8], forward_m)
     trajectory = Trajectory(table[:, 0], body)

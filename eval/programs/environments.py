@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from hippodrome._files import read_bounded
+from hippodrome._files import read_bounded, why_unreadable
 from hippodrome._folders import temporary_folder
 from hippodrome._processes import dying_with_me
 from hippodrome.eval.methods.protocol import MethodError
@@ -56,7 +56,7 @@ def words_of(spec: MethodSpec, command: str, **places: Path) -> list[str]:
     try:
         requirements = read_bounded(spec.environment, MAX_REQUIREMENTS_BYTES).decode("utf-8")
     except (OSError, ValueError) as error:
-        raise NotInstalled(f"environment {spec.environment}: cannot be read: {error}") from None
+        raise NotInstalled(f"environment {spec.environment}: cannot be read: {why_unreadable(error)}") from None
     return command_words(command, python=Environment(spec.environment.stem, requirements).python(), **places)
 
 

@@ -13,7 +13,7 @@ from hippodrome.eval.files.trajectories import read_tum
 from hippodrome.eval.methods.protocol import Answer, Cost, Given, Localized, Mapped, MethodError
 from hippodrome.eval.programs.camera_poses import read_camera_tum
 from hippodrome.eval.programs.environments import words_of
-from hippodrome.eval.programs.layouts import write_sequence
+from hippodrome.eval.programs.layouts import ODOMETRY, write_sequence
 from hippodrome.eval.programs.limits import Limits
 from hippodrome.eval.programs.process import Process, last_words, started
 from hippodrome.eval.programs.references import printable
@@ -88,7 +88,10 @@ def read_answer(out: Path, process: Process, camera_ahead_m: float | None = None
 
 
 def answers_at(times_s: list[float], declared: Trajectory) -> list[Answer]:
-    """One answer per observation: the declared pose nearest to its time within half a step, or else not localized."""
+    """One answer per observation: the declared pose nearest to its time within half a step, or else not localized.
+
+    Raises MethodError if no pose has the time of an observation: its clock is another one, and it may well have been localized.
+    """
     step_s = min((later - sooner for sooner, later in pairwise(times_s)), default=0.1)
     known_s, answers = declared.t_s.tolist(), []
     pose = declared.poses[0]
@@ -99,4 +102,9 @@ def answers_at(times_s: list[float], declared: Trajectory) -> list[Answer]:
         if localized:
             pose = declared.poses[nearest]
         answers.append(Answer(t_s, float(pose[0]), float(pose[1]), float(pose[2]), localized))
+    if not any(answer.localized for answer in answers):
+        span, wanted = f"{known_s[0]:.3f} to {known_s[-1]:.3f} s", f"{times_s[0]:.3f} to {times_s[-1]:.3f} s"
+        raise MethodError(
+            f"none of its {len(known_s)} poses, {span}, has the time of an observation, {wanted}; times are those of {ODOMETRY}"
+        )
     return answers

@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from pydantic import ValidationError
 
 from hippodrome.core.types import FloatArray
-from hippodrome.sim.recording import CHUNK_FRAMES, Recording, RecordingError, chunk_path, frame_name
+from hippodrome.sim.key_words import first_fault
+from hippodrome.sim.recording import CHUNK_FRAMES, MANIFEST, Recording, RecordingError, chunk_path, frame_name
 from hippodrome.sim.render.camera import CameraSpec
 
 # Columns: the optical axes (x right, y down, z forward) in body axes (x forward, y left, z up).
@@ -27,9 +29,16 @@ class Picture:
 
 
 def camera_of(recording: Recording) -> CameraSpec | None:
-    """The camera's specification; None for an imported drive whose calibration is unknown."""
+    """The camera's specification; None for an imported drive whose calibration is unknown.
+
+    Raises RecordingError for a camera that is none of ours: of more pixels a side, or more frames a second, than ours may have.
+    """
     values = recording.manifest.get("camera", {})
-    return CameraSpec.model_validate(values) if "fov_deg" in values else None
+    try:
+        return CameraSpec.model_validate(values) if "fov_deg" in values else None
+    except ValidationError as error:
+        place, cure = recording.folder / MANIFEST, "import the drive anew, with other frames (--size, --fps)"
+        raise RecordingError(f"{place}: camera.{first_fault(error, values, CameraSpec)}; {cure}") from None
 
 
 def intrinsics(camera: CameraSpec) -> FloatArray:

@@ -14,6 +14,7 @@ from hippodrome.eval.exchange.drives.clock import TimeUnit, in_seconds
 from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import Motion, motion_table
 from hippodrome.eval.exchange.readers.text import read_lines
+from hippodrome.eval.files.number_words import first_that_is_none, no_number
 
 # What a column may be called, best first; case, blanks, dots, slashes and hyphens do not count, nor does a unit behind the name.
 TIMES: Final = ("t", "time", "timestamp", "seconds_elapsed", "elapsed", "stamp", "epoch", "time_stamp", "loggingtime", "unixtime")
@@ -95,7 +96,8 @@ def read_motion(path: Path, unit: TimeUnit | None = None) -> Motion:
         words = [word.strip().strip('"') for word in line.split(separator)]
         if len(words) <= max(column.index for column in wanted) or (exactly and len(words) != 3):
             needed = 3 if exactly else max(column.index for column in wanted) + 1
-            raise ExchangeError(f"{path}: line {number}: {len(words)} columns, expected {needed}")
+            cure = "; numbers have a point, as 1.5" if separator == "," and ";" in line else ""
+            raise ExchangeError(f"{path}: line {number}: {len(words)} columns, expected {needed}{cure}")
         values = [words[column.index] for column in wanted]
         if not exactly and not all(values):  # loggers leave a cell empty where a sensor had nothing new
             empty += 1
@@ -103,7 +105,8 @@ def read_motion(path: Path, unit: TimeUnit | None = None) -> Motion:
         try:
             rows.append([float(value) for value in values])
         except ValueError:
-            raise ExchangeError(f"{path}: line {number}: not a number in '{line.strip()[:60]}'") from None
+            cure = no_number(first_that_is_none(values))
+            raise ExchangeError(f"{path}: line {number}: not a number in '{line.strip()[:60]}': {cure}") from None
     if not rows:
         raise ExchangeError(f"{path}: no data; expected lines of t_s,speed,yaw_rate")
     table = np.array(rows)
@@ -116,6 +119,15 @@ def read_motion(path: Path, unit: TimeUnit | None = None) -> Motion:
         named = None  # a header that was copied from somewhere: the size of the stamps tells better
     t_s = in_seconds(table[:, 0], unit or named, str(path))
     return motion_table(t_s, *in_units(path, columns, table), str(path))
+
+
+def is_motion(path: Path) -> bool:
+    """Whether a table is one of self-motion, whatever its name: its columns are named so, or are three. Raises ExchangeError."""
+    lines = read_lines(path)
+    separator = _separator(lines)
+    head = next((line for line in lines if line.strip()), "").strip()
+    data = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
+    return _wanted(_header(head.lstrip("#"), separator)) is not None or len(data.strip().split(separator)) == 3
 
 
 def in_units(path: Path, columns: MotionColumns, table: FloatArray) -> tuple[FloatArray, FloatArray]:

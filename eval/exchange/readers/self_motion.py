@@ -12,7 +12,7 @@ from hippodrome.eval.exchange.drives.errors import ExchangeError
 from hippodrome.eval.exchange.drives.foreign import ForeignDrive, Motion, motion_of
 from hippodrome.eval.exchange.drives.lever import Ahead, moved_to_axle
 from hippodrome.eval.exchange.drives.poses import Axes
-from hippodrome.eval.exchange.readers.motion_csv import read_motion
+from hippodrome.eval.exchange.readers.motion_csv import is_motion, read_motion
 from hippodrome.eval.exchange.readers.tables import is_kitti_poses, read_poses
 from hippodrome.eval.exchange.readers.text import read_lines, read_table
 from hippodrome.eval.files import spatial
@@ -27,7 +27,7 @@ def read_self_motion(
     """The self-motion of a file, and words that say what it was made of.
 
     Args:
-        path: A ``.csv`` of speeds and yaw rates, or TUM's or KITTI's poses.
+        path: A table of speeds and yaw rates, or TUM's or KITTI's poses.
         axes: Which way TUM poses point.
         t_s: Times (N,) of KITTI's poses; None: unknown.
         unit: Unit of the file's times; None recognises it.
@@ -36,7 +36,7 @@ def read_self_motion(
     Raises:
         ExchangeError: It cannot be read.
     """
-    if path.suffix.lower() == ".csv":
+    if path.suffix.lower() == ".csv" or (path.suffix.lower() != ".tum" and is_motion(path)):
         return read_motion(path, unit), f"{path.name}, {CSV}"
     return motion_of(moved_to_axle(_level_poses(path, axes, t_s, unit), ahead, str(path)), str(path)), f"{path.name}, {POSES}"
 

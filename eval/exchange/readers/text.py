@@ -10,6 +10,7 @@ import numpy as np
 from hippodrome._files import read_bounded, why_unreadable
 from hippodrome.core.types import FloatArray
 from hippodrome.eval.exchange.drives.errors import ExchangeError
+from hippodrome.eval.files.number_words import first_that_is_none, no_number, with_commas
 from hippodrome.sim.yaml_file import MAX_BYTES, ScenarioError, parse_yaml
 
 MAX_TABLE_BYTES: Final = 512 << 20
@@ -30,15 +31,17 @@ def read_table(path: Path, columns: int, separator: str | None = None, exactly: 
     """
     rows = []
     for number, line in enumerate(read_lines(path), start=1):
-        if not line.strip() or line.startswith("#"):
+        if not line.strip() or line.lstrip().startswith("#"):
             continue
         words = line.strip().split(separator)
         if len(words) < columns or (exactly and len(words) != columns):
-            raise ExchangeError(f"{path}: line {number}: {len(words)} columns, expected {columns}")
+            cure = with_commas(line, columns) if separator is None else ""
+            raise ExchangeError(f"{path}: line {number}: {len(words)} columns, expected {columns}{cure}")
         try:
             rows.append([float(word) for word in words[:columns]])
         except ValueError:
-            raise ExchangeError(f"{path}: line {number}: not a number in '{line.strip()[:60]}'") from None
+            found = no_number(first_that_is_none(words[:columns]), number == 1)
+            raise ExchangeError(f"{path}: line {number}: not a number in '{line.strip()[:60]}': {found}") from None
     if not rows:
         raise ExchangeError(f"{path}: no data")
     table = np.array(rows)

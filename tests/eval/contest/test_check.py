@@ -27,6 +27,15 @@ class Chance(Mapper):
         shift = int.from_bytes(os.urandom(4)) * 1e-12
         return [(t, x + shift, y, h) for t, x, y, h in super().map(observations, given)]
 
+class Degrees(Mapper):
+    def map(self, observations, given):
+        return [(t, x, y, 57.3 * h) for t, x, y, h in super().map(observations, given)]
+
+class Askew(Mapper):
+    frame = "metric"
+    def map(self, observations, given):
+        return [(t, x, y, h + 1.57) for t, x, y, h in super().map(observations, given)]
+
 class Still:
     frame = "metric"
     def map(self, observations, given):
@@ -65,6 +74,8 @@ def verdict(materials, tmp_path, monkeypatch):
         ("Mapper", "ok   map: 600 poses from 0.1 s to 60.0 s of 60.0 s"),
         ("Moved", "FAIL frame: it lies 499.8 m off and a rigid fit leaves 0."),
         ("Scaled", "FAIL frame: it is 3.00 times too large to be in metres; declare frame 'own'"),
+        ("Degrees", "FAIL heading: it is "),
+        ("Askew", "ok   note: heading: it is "),
         ("Chance", "ok   again: not deterministic: two runs are up to"),
         ("Still", "FAIL map: "),
         ("Lost", "ok   localize: localized in 0 % of the steps, never within 20 m"),

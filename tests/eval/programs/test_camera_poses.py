@@ -25,12 +25,28 @@ def test_the_body_is_behind_the_camera():
     assert_allclose(body_poses(positions, quaternions, 1.6), body, atol=1e-12)
 
 
-@pytest.mark.parametrize("text", ["", "0 1 2\n", "zero 0 0 0 0 0 0 1\n"])
-def test_a_broken_trajectory_is_refused(tmp_path, text):
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no poses; a line for each is expected"),
+        ("# t\n", "no poses"),
+        ("0 1 2\n", "line 1: 3 columns, expected 8"),
+        ("0 0 0 0 0 0 0 1\n1 2\n", "line 2: 2 columns, expected 8"),
+        ("0,0,0,0,0,0,0,1\n", "line 1: 1 columns, expected 8 .*; write spaces in place of commas"),
+        ("zero 0 0 0 0 0 0 1\n", "line 1: 'zero' is no number"),
+        ("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 nan\n", "sample 1 is not finite"),
+    ],
+)
+def test_a_broken_trajectory_is_refused(tmp_path, text, words):
     path = tmp_path / "live.tum"
     path.write_text(text)
-    with pytest.raises(HippodromeError, match=r"live\.tum"):
+    with pytest.raises(HippodromeError, match=rf"live\.tum: .*{words}|live\.tum: {words}"):
         read_camera_tum(path, 1.6)
+
+
+def test_comments_are_passed_over(tmp_path):
+    (tmp_path / "live.tum").write_text("# t x y z qx qy qz qw\n0.1 0 0 0 0 0 0 1\n  # lost\n0.2 0 0 1 0 0 0 1\n")
+    assert_allclose(read_camera_tum(tmp_path / "live.tum", 0.0).t_s, [0.1, 0.2])
 
 
 def test_lines_repeated_for_lost_frames_are_dropped(tmp_path):

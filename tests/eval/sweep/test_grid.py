@@ -58,7 +58,7 @@ def test_one_value_of_a_noise_level():
     [
         ("speed", 3, "unknown key"),
         ("camera.zoom", 3, "unknown key"),
-        ("camera.width", 1, "greater than or equal to 16"),
+        ("camera.width", 1, "must be a number of at least 16"),
         ("name.first", 1, "'name' has no keys of its own"),
         ("mapper.memory.view_cells.kind", "colour", "gradient"),
     ],

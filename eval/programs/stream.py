@@ -148,23 +148,25 @@ class Line:
                 self._gone()
 
     def _receive(self) -> None:
+        if not self._take():
+            self._wait(writing=False)
+
+    def _take(self) -> bool:
+        """Keep what the process has said by now; False: nothing yet."""
         try:
             data = os.read(self._from, CHUNK_BYTES)
         except BlockingIOError:
-            self._wait(writing=False)
-            return
+            return False
         if not data:
             self._gone()
         self._held += data
+        return True
 
     def _wait(self, writing: bool) -> None:
         """Until the process takes or gives something; what it says too early is kept, so that neither waits for the other."""
         readable, _, _ = select.select([self._from], [self._to] if writing else [], [], POLL_S)
         if readable and writing:
-            data = os.read(self._from, CHUNK_BYTES)
-            if not data:
-                self._gone()
-            self._held += data
+            self._take()
         if len(self._held) > MAX_MESSAGE_BYTES:
             raise MethodError(f"it sent more than {MAX_MESSAGE_BYTES >> 20} MiB without being asked")
         now_s = time.monotonic()
@@ -173,17 +175,8 @@ class Line:
             self._process.poll()
             if (cause := self._process.failure()) is not None:
                 raise self._process.error(cause + (self._why_silent() if cause.startswith("hung") else ""))
-            if now_s - self._asked_s > LOOK_S and self._is_closed(writing) and not self._said_more():
+            if now_s - self._asked_s > LOOK_S and self._is_closed(writing) and not self._take():  # perhaps its last words
                 self._gone()
-
-    def _said_more(self) -> bool:
-        """Whether the process said something before it closed its pipe, after ``_wait`` had looked for it; it is kept."""
-        try:
-            data = os.read(self._from, CHUNK_BYTES)
-        except BlockingIOError:
-            return False
-        self._held += data
-        return bool(data)
 
     def _why_silent(self) -> str:
         """What may be the matter with a process that hung: most forget to give out what they have written."""
@@ -192,14 +185,12 @@ class Line:
 
     def _unread(self) -> int:
         """Bytes that it was sent and has not read."""
-        count: int = struct.unpack("i", fcntl.ioctl(self._to, termios.FIONREAD, bytes(4)))[0]
-        return count
+        return int(struct.unpack("i", fcntl.ioctl(self._to, termios.FIONREAD, bytes(4)))[0])
 
     def _is_closed(self, writing: bool) -> bool:
         """Whether the process closed a pipe that it still needs: for its answer, or for what it has not read yet."""
-        if not writing and self._process.has_let_go(self._from):
-            return True
-        return (writing or self._unread() > 0) and self._process.has_let_go(self._to)
+        answers = not writing and self._process.has_let_go(self._from)
+        return answers or ((writing or self._unread() > 0) and self._process.has_let_go(self._to))
 
     def _message(self) -> bytes | None:
         """The next whole message that has arrived."""

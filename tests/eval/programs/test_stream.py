@@ -53,5 +53,6 @@ def test_a_last_message_that_comes_between_two_looks_is_heard():
 
 
 def test_half_a_message_is_none():
+    body = pb.FromMethod(finished=pb.Finished()).SerializeToString()
     with pytest.raises(MethodError, match="it ended before the drive did"):
-        Line(Ending(b"\x05\x01")).asked(pb.ToMethod(end=pb.End()), "finished")
+        Line(Ending(b"\x05" + body[:1])).asked(pb.ToMethod(end=pb.End()), "finished")

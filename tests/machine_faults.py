@@ -28,7 +28,7 @@ if [ "$after" != 0 ]; then
    until mount -o remount,ro "$folder"; do sleep 0.1; done) >/dev/null 2>&1 & watch=$!
 fi
 "$@"; status=$?
-if [ "$after" != 0 ]; then kill "$watch"; wait "$watch" 2>/dev/null; fi
+if [ "$after" != 0 ]; then kill "$watch" 2>/dev/null; wait "$watch" 2>/dev/null; fi
 cp -a "$folder/." "$kept"; exit $status"""
 
 

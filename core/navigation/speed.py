@@ -51,3 +51,11 @@ def stop_mps2(speed_mps: float, to_stop_m: float, config: DriveConfig, vehicle: 
     if not math.isfinite(to_stop_m) or needed < BEGUN_SHARE * config.braking_mps2:
         return math.inf
     return -min(needed, vehicle.max_braking_mps2)
+
+
+def there_mps2(to_goal_m: float, config: DriveConfig) -> float:
+    """What stops a vehicle that is at its goal, within the tolerance; else infinite.
+
+    The speed follows the wanted one with a lag, so that the last hand's breadths would take a second and more.
+    """
+    return -config.braking_mps2 if to_goal_m < config.goal_tolerance_m else math.inf

@@ -17,10 +17,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from hippodrome.core.navigation import sweep
+from hippodrome.core.navigation.asphalt import followed, kinds_of
 from hippodrome.core.navigation.border import (
     CELL_M,
     OTHER,
-    PAINT,
     REACH_M,
     ROAD,
     STEP_M,
@@ -37,10 +37,7 @@ from hippodrome.core.views.config import CameraGeometry
 CELLS = 400  # along each side: 80 m, in which the vehicle is kept 20 m away from the rim
 SHIFT_M = 20.0
 FAR_M = 12.0  # a pixel farther away spans more than a metre
-DARKEST, BRIGHTEST, PAINT_LEVEL = 0.45, 1.38, 1.7  # levels relative to the asphalt right ahead: shade, kerbstones, paint
-COLOURFUL = 0.16  # difference between a pixel's colours, relative to its level, from which on it is grass
 PATCH_M = (5.5, 0.9)  # the asphalt right ahead: so far ahead of the rear axle and to either side
-STEADY = 0.85  # weight of the past in the level of the asphalt
 
 FITS_SHARE = 0.1  # of a path that may seem to be no road: its cells are as coarse as that
 SHIFT_STEP_M = 0.5
@@ -115,27 +112,22 @@ class Ground:
         self._origin_m = self._origin_m.copy()
         self._origin_m[axis] += cells * CELL_M
 
-    def see(self, frame: Frame, gap_m: float) -> None:
-        """Enter a frame; what lies beyond the next vehicle ahead, ``gap_m`` from the bumper, is hidden."""
+    def see(self, frame: Frame, gap_m: float, on_road: bool = True) -> None:
+        """Enter a frame; what lies beyond the next vehicle ahead, ``gap_m`` from the bumper, is hidden.
+
+        Of a vehicle that is not ``on_road`` with all of it, what lies ahead may be no asphalt, and its level is not followed.
+        """
         if self._view is None or self._view.ahead_m.shape[1] != frame.shape[1]:
             self._view = ground_view(self._camera, frame.shape[1], frame.shape[0])
             self._stand()
         view = self._view
         part = frame[view.rows].astype(np.float32)
         level = part.mean(axis=2) if part.ndim == 3 else part
+        colour = (part.max(axis=2) - part.min(axis=2)) / np.maximum(level, 1.0) if part.ndim == 3 else np.zeros_like(level)
         patch = (view.ahead_m < PATCH_M[0]) & (np.abs(view.left_m) < PATCH_M[1])
-        here = float(np.median(level[patch]))
-        usual = here if math.isnan(self._level) else self._level
-        if 0.5 < here / max(usual, 1.0) < 1.5:
-            self._level = STEADY * usual + (1.0 - STEADY) * here
-        relative = level / max(self._level, 1.0)
-        kind = np.where((relative > DARKEST) & (relative < BRIGHTEST), ROAD, OTHER).astype(np.uint8)
-        if part.ndim == 3:
-            colour = (part.max(axis=2) - part.min(axis=2)) / np.maximum(level, 1.0)
-            kind[colour > COLOURFUL] = OTHER
-            kind[(relative > PAINT_LEVEL) & (colour < COLOURFUL)] = PAINT
-        else:
-            kind[relative > PAINT_LEVEL] = PAINT
+        if on_road or math.isnan(self._level):
+            self._level = followed(self._level, level, colour, patch)
+        kind = kinds_of(level / max(self._level, 1.0), colour)
         hidden = _hidden(kind)
         kind[hidden & (kind != OTHER)] = UNKNOWN
         kind[:-THICK_PX][hidden[THICK_PX:]] = UNKNOWN

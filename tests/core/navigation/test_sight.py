@@ -140,6 +140,17 @@ def test_the_ground_below_the_car_is_road_from_the_first_frame_on():
     assert way.free_m == math.inf and way.seen_m > 3.0
 
 
+def test_beside_the_road_what_lies_ahead_is_not_taken_for_asphalt():
+    after = []
+    for on_road in (True, False):
+        ground = Ground(CameraGeometry())
+        ground.see(np.full((120, 160, 3), 100, dtype=np.uint8), math.inf)
+        for _ in range(20):
+            ground.see(np.full((120, 160, 3), 130, dtype=np.uint8), math.inf, on_road)
+        after.append(ground._level)
+    assert after[0] > 125.0 and after[1] == 100.0
+
+
 def test_behind_a_kerb_there_is_no_road_and_round_its_end_the_border_goes_on_half_way():
     part = cells()
     part[:80, :40] = UNKNOWN

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,11 @@ STEADY = 0.85  # weight of the past in the level of the asphalt
 LEAST_PATCH = 0.25  # of the patch must lie before the first border to tell the level
 SUDDEN = (0.5, 1.5)  # a level that changes by more is none of asphalt
 
+Levels: TypeAlias = NDArray[np.floating[Any]]
+"""Levels of pixels (h, w), or shares of them."""
 
-def kinds_of(relative: NDArray[np.floating], colour: NDArray[np.floating]) -> UInt8Array:
+
+def kinds_of(relative: Levels, colour: Levels) -> UInt8Array:
     """What pixels (h, w) show: ``ROAD``, ``OTHER`` or ``PAINT``.
 
     Args:
@@ -29,7 +33,7 @@ def kinds_of(relative: NDArray[np.floating], colour: NDArray[np.floating]) -> UI
     return kind
 
 
-def followed(before: float, level: NDArray[np.floating], colour: NDArray[np.floating], patch: NDArray[np.bool_]) -> float:
+def followed(before: float, level: Levels, colour: Levels, patch: NDArray[np.bool_]) -> float:
     """The level of the asphalt after a frame.
 
     It is that of the patch right ahead, in each column up to where what is seen at the frame's lower rim ends. In a sharp bend

@@ -37,6 +37,7 @@ from hippodrome.core.views.config import CameraGeometry
 CELLS = 400  # along each side: 80 m, in which the vehicle is kept 20 m away from the rim
 SHIFT_M = 20.0
 FAR_M = 12.0  # a pixel farther away spans more than a metre
+VIEW_SHARE = 0.9  # of the camera's view to either side, beyond which the ground may be seen, or not
 PATCH_M = (5.5, 0.9)  # the asphalt right ahead: so far ahead of the rear axle and to either side
 
 FITS_SHARE = 0.1  # of a path that may seem to be no road: its cells are as coarse as that
@@ -218,6 +219,12 @@ class Ground:
                 if share < best[1] - 0.05:
                     best = shift_m, share
         return best
+
+    def in_view(self, points_m: FloatArray) -> NDArray[np.bool_]:
+        """Whether points (n, 2) in the vehicle's axes lie between the sides of what the camera shows from where it is."""
+        depth_m, widest = points_m[:, 0] - self._camera.forward_m, math.tan(0.5 * math.radians(self._camera.fov_deg))
+        shown: NDArray[np.bool_] = np.abs(points_m[:, 1]) < VIEW_SHARE * widest * depth_m
+        return shown
 
     def off_road_share(self, points_m: FloatArray) -> float:
         """Which share of points (n, 2) in the vehicle's axes is known to be no road, of those that are known."""

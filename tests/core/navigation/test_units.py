@@ -50,7 +50,7 @@ def test_stopping_is_half_of_the_speed_squared_over_the_braking():
 def test_the_intelligent_driver_model_holds_its_gap():
     wanted = DRIVE.jam_gap_m + 10.0 * DRIVE.headway_s
     assert following_mps2(10.0, Radar(wanted, 0.0), DRIVE, VEHICLE) == pytest.approx(0.0)
-    assert following_mps2(10.0, Radar(0.5 * wanted, 0.0), DRIVE, VEHICLE) == pytest.approx(-3.0 * DRIVE.acceleration_mps2)
+    assert following_mps2(10.0, Radar(0.5 * wanted, 0.0), DRIVE, VEHICLE) == pytest.approx(-3.0 * DRIVE.following_mps2)
     assert math.isinf(following_mps2(10.0, Radar(), DRIVE, VEHICLE))
     assert following_mps2(10.0, Radar(8.0, 10.0), DRIVE, VEHICLE) == -VEHICLE.max_braking_mps2
 

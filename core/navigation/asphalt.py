@@ -54,3 +54,12 @@ def followed(before: float, level: Levels, colour: Levels, patch: NDArray[np.boo
         return before
     seen = float(np.median(level[here]))
     return STEADY * before + (1.0 - STEADY) * seen if SUDDEN[0] < seen / max(before, 1.0) < SUDDEN[1] else before
+
+
+def hidden(kind: UInt8Array) -> NDArray[np.bool_]:
+    """Pixels (h, w) above a stretch of no road in their column: a grey wall behind the pavement looks like asphalt beyond it."""
+    other = kind[::-1] == OTHER
+    begins = np.zeros(kind.shape, dtype=np.bool_)
+    begins[2:] = other[:-2] & other[1:-1] & other[2:]
+    behind: NDArray[np.bool_] = np.maximum.accumulate(begins, axis=0)[::-1]
+    return behind

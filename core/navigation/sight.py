@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from hippodrome.core.navigation import sweep
-from hippodrome.core.navigation.asphalt import followed, kinds_of
+from hippodrome.core.navigation.asphalt import followed, hidden, kinds_of
 from hippodrome.core.navigation.border import (
     CELL_M,
     OTHER,
@@ -38,6 +38,7 @@ CELLS = 400  # along each side: 80 m, in which the vehicle is kept 20 m away fro
 SHIFT_M = 20.0
 FAR_M = 12.0  # a pixel farther away spans more than a metre
 VIEW_SHARE = 0.9  # of the camera's view to either side, beyond which the ground may be seen, or not
+SIGHTS, HIDING = 40, 3  # places on a line of sight; so many of them that are no road hide what lies beyond
 PATCH_M = (5.5, 0.9)  # the asphalt right ahead: so far ahead of the rear axle and to either side
 
 FITS_SHARE = 0.1  # of a path that may seem to be no road: its cells are as coarse as that
@@ -129,9 +130,9 @@ class Ground:
         if on_road or math.isnan(self._level):
             self._level = followed(self._level, level, colour, patch)
         kind = kinds_of(level / max(self._level, 1.0), colour)
-        hidden = _hidden(kind)
-        kind[hidden & (kind != OTHER)] = UNKNOWN
-        kind[:-THICK_PX][hidden[THICK_PX:]] = UNKNOWN
+        behind = hidden(kind)
+        kind[behind & (kind != OTHER)] = UNKNOWN
+        kind[:-THICK_PX][behind[THICK_PX:]] = UNKNOWN
         reach = min(FAR_M + self._camera.forward_m, gap_m + 2.6)
         near = (view.ahead_m < reach) & (kind != UNKNOWN)
         _enter(self._cells, self._origin_m, self.pose, view.ahead_m[near], view.left_m[near], kind[near])
@@ -221,10 +222,14 @@ class Ground:
         return best
 
     def in_view(self, points_m: FloatArray) -> NDArray[np.bool_]:
-        """Whether points (n, 2) in the vehicle's axes lie between the sides of what the camera shows from where it is."""
-        depth_m, widest = points_m[:, 0] - self._camera.forward_m, math.tan(0.5 * math.radians(self._camera.fov_deg))
-        shown: NDArray[np.bool_] = np.abs(points_m[:, 1]) < VIEW_SHARE * widest * depth_m
-        return shown
+        """Whether points (n, 2) in the vehicle's axes can be seen from here: nothing that is no road lies before them."""
+        camera_m = np.array([self._camera.forward_m, 0.0])
+        apart_m = points_m - camera_m
+        shown = np.abs(apart_m[:, 1]) < VIEW_SHARE * math.tan(0.5 * math.radians(self._camera.fov_deg)) * apart_m[:, 0]
+        sights = camera_m + np.linspace(0.0, 1.0, SIGHTS, endpoint=False)[:, None, None] * apart_m
+        before = self.kinds_at(sights.reshape(-1, 2)).reshape(SIGHTS, -1)
+        seen: NDArray[np.bool_] = shown & (np.sum(before == OTHER, axis=0) < HIDING)
+        return seen
 
     def off_road_share(self, points_m: FloatArray) -> float:
         """Which share of points (n, 2) in the vehicle's axes is known to be no road, of those that are known."""
@@ -243,15 +248,6 @@ class Ground:
         kind = np.full(len(points_m), UNKNOWN, dtype=np.uint8)
         kind[inside] = self._cells[i[inside], j[inside]]
         return kind
-
-
-def _hidden(kind: UInt8Array) -> NDArray[np.bool_]:
-    """Pixels (h, w) above a stretch of no road in their column: a grey wall behind the pavement looks like asphalt beyond it."""
-    other = kind[::-1] == OTHER
-    begins = np.zeros(kind.shape, dtype=np.bool_)
-    begins[2:] = other[:-2] & other[1:-1] & other[2:]
-    hidden: NDArray[np.bool_] = np.maximum.accumulate(begins, axis=0)[::-1]
-    return hidden
 
 
 @njit(cache=True)

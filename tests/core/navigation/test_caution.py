@@ -7,8 +7,6 @@ import pytest
 
 from hippodrome.core.navigation.border import OTHER, PAINT, ROAD, UNKNOWN
 from hippodrome.core.navigation.caution import TURN_MPS, leads_off_road, seems_road, turn_mps
-from hippodrome.core.navigation.sight import Ground
-from hippodrome.core.views.config import CameraGeometry
 
 AHEAD = np.column_stack([np.arange(1.0, 14.0, 0.5), np.zeros(26), np.zeros(26)])
 
@@ -16,14 +14,14 @@ AHEAD = np.column_stack([np.arange(1.0, 14.0, 0.5), np.zeros(26), np.zeros(26)])
 class Town:
     """Ground that is told by a function of place in the vehicle's axes."""
 
-    def __init__(self, kind):
-        self.kind = kind
+    def __init__(self, kind, is_shown=lambda x, y: True):
+        self.kind, self.is_shown = kind, is_shown
 
     def kinds_at(self, points_m):
         return np.array([self.kind(x, y) for x, y in points_m], dtype=np.uint8)
 
     def in_view(self, points_m):
-        return Ground(CameraGeometry()).in_view(points_m)
+        return np.array([self.is_shown(x, y) for x, y in points_m])
 
     def off_road_share(self, points_m):
         kinds = self.kinds_at(points_m)
@@ -58,15 +56,17 @@ def test_a_way_seems_road_where_enough_of_it_was_seen():
     assert not leads_off_road(Town(lambda x, y: ROAD), AHEAD[:2])
 
 
-@pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_of_a_sharp_corner_counts_what_the_camera_can_show(side):
-    turned = side * np.clip((np.arange(2.0, 8.1, 0.5) - 3.0) * 0.32, 0.0, 2.1)  # full lock, round more than a right angle
-    corner = np.column_stack([2.0 + np.cumsum(0.5 * np.cos(turned)), np.cumsum(0.5 * np.sin(turned)), turned])
+def test_of_a_sharp_corner_counts_what_the_camera_can_show():
+    bend = -0.32 * np.clip(np.arange(2.0, 8.1, 0.5) - 3.0, 0.0, None)  # to the right, at full lock
+    corner = np.column_stack([2.0 + np.cumsum(0.5 * np.cos(bend)), np.cumsum(0.5 * np.sin(bend)), bend])
 
-    def shown(x, y, kind=ROAD):
-        return kind if abs(y) < x - CameraGeometry().forward_m or (x < 3.0 and abs(y) < 1.5) else UNKNOWN
+    def is_shown(x, y):
+        return y > -1.2
 
-    assert seems_road(Town(shown), corner)
-    assert not seems_road(Town(lambda x, y: shown(x, y) if x < 4.0 else UNKNOWN), corner)
-    assert not seems_road(Town(lambda x, y: shown(x, y, OTHER if x > 4.5 else ROAD)), corner)
-    assert not seems_road(Town(lambda x, y: UNKNOWN), corner)
+    def seen(x, y):
+        return ROAD if is_shown(x, y) else UNKNOWN
+
+    assert not seems_road(Town(seen), corner) and seems_road(Town(seen, is_shown), corner)
+    assert not seems_road(Town(lambda x, y: UNKNOWN if x > 4.5 else seen(x, y), is_shown), corner)
+    assert not seems_road(Town(lambda x, y: OTHER if x > 5.5 else seen(x, y), is_shown), corner)
+    assert not seems_road(Town(lambda x, y: ROAD if x < 3.0 else UNKNOWN, lambda x, y: x < 3.0), corner)

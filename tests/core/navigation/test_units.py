@@ -36,7 +36,7 @@ def test_samsons_law_steers_back_to_the_lane():
 def test_the_wheels_stand_as_the_bicycle_needs_them_and_never_beyond_their_stop():
     assert steering_rad(0.1, 1.0, DRIVE, VEHICLE) == pytest.approx(math.atan(0.27))
     assert steering_rad(9.0, 0.0, DRIVE, VEHICLE) == VEHICLE.max_steering_rad
-    assert steering_rad(0.3, 10.0, DRIVE, VEHICLE) == pytest.approx(math.atan(2.7 * 0.03))
+    assert steering_rad(0.3, 10.0, DRIVE, VEHICLE) == pytest.approx(math.atan(2.7 * 0.0375))
 
 
 def test_stopping_is_half_of_the_speed_squared_over_the_braking():

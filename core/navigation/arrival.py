@@ -79,6 +79,8 @@ class Arrival:
         if speed_mps > STANDING_MPS:
             return 0.0
         self._course = None
+        if not self._is_known(1.0):
+            return LOOK_MPS  # the end told nothing, and who backs sees nothing new: the way round
         if not self._escape.to_road(plan.u_m - self._goal_u_m + BEYOND_M, radar):
             return LOOK_MPS  # somebody is behind: the way round
         self._belief.plan = None

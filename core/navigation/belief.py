@@ -41,7 +41,8 @@ SHARP_1PM, SHARP_M = 0.2, 3.0  # the path through a sharper corner, so far ahead
 FOUND_EVERY_M, FOUND_REPEATS = 1.0, 10.0  # the place by the road network is taken in so often, and repeats its errors over 10 m
 FOUND_SIGMAS, ELSEWHERE_M = 4.0, 10.0  # driven while that place is so far elsewhere, before it is believed more
 BACKED_SHARE = 0.7  # of the hypotheses that must be where the localizer is, before that is believed
-FOUND_FLOOR = (0.2**2, 0.2**2, 0.02**2)  # variances that a place by the road network has at least
+FOUND_FLOOR = 0.2, 0.2, 0.02  # m along, m across, rad: deviations that a place by hypotheses has at least ..
+FOUND_ALONG_M = 1.0  # .. and along the way, where no view was recognised: errors after a fix were 2.2 times what was thought
 BORDER_SIGMA_M = 0.3  # of the distance to a border in the ground's map of cells of .2 m
 
 
@@ -130,7 +131,7 @@ class Belief:
         self._since_found_m += distance_m
         if found is None:
             return
-        covariance = found.covariance + np.diag(FOUND_FLOOR)
+        covariance = tracks.widened(found.covariance, found.pose, FOUND_ALONG_M, *FOUND_FLOOR[1:])
         if self.track is None:
             self._restart(found.pose, covariance)
             return
@@ -181,7 +182,7 @@ class Belief:
             return
         near = where.near(estimate.pose)
         if near.share > BACKED_SHARE:
-            self._restart(near.pose, near.covariance + np.diag(FOUND_FLOOR))
+            self._restart(near.pose, tracks.widened(near.covariance, near.pose, *FOUND_FLOOR))
 
     def _is_refuted(self, estimate: LocalizationEstimate, distance_m: float) -> bool:
         """Whether the localizer still says what was seen to be wrong."""

@@ -12,7 +12,8 @@ from hippodrome.core.navigation.sight import Ground
 from hippodrome.core.navigation.ways import strip
 from hippodrome.core.types import FloatArray
 
-SEEN, NOT_ROAD = 0.7, 0.05  # so much of a guess must have been seen, and hardly any of it be no road
+SEEN, NOT_ROAD = 0.7, 0.05  # so much of a guess, as far as it can be seen, must have been, and hardly any of it be no road
+LEAST_SEEN: Final = 0.4  # of all of it
 AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of a way, which must not lead off the road
 OFF_ROAD: Final = 0.15  # of it
 LEAST_PLACES: Final = 2  # of a way that are seen to be no road: one alone is a speck
@@ -27,9 +28,17 @@ GOES_ON: Final = 0.6  # so much of that must be seen, and be road
 
 
 def seems_road(ground: Ground, ahead: FloatArray) -> bool:
-    """Whether a way (n, 3), in the vehicle's axes, has been seen, and to be road."""
-    kinds = ground.kinds_at(strip(ahead, HALF_BODY_M))
-    return bool(np.mean(kinds != UNKNOWN) > SEEN and np.mean(kinds == OTHER) < NOT_ROAD)
+    """Whether a way (n, 3), in the vehicle's axes, has been seen, and to be road.
+
+    In a sharp corner the way lies behind the pavement within, or beside the camera's view. That counts once it has been seen, and
+    not before: else the vehicle would leave a likely way right in the corner, for a search on sight that sees no more of it.
+    """
+    points = strip(ahead, HALF_BODY_M)
+    kinds = ground.kinds_at(points)
+    seen = kinds != UNKNOWN
+    can_be_seen = seen | ground.in_view(points)
+    enough = np.mean(seen) > LEAST_SEEN and np.sum(seen) > SEEN * np.sum(can_be_seen)
+    return bool(enough and np.mean(kinds == OTHER) < NOT_ROAD)
 
 
 def leads_off_road(ground: Ground, ahead: FloatArray) -> bool:

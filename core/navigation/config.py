@@ -44,8 +44,8 @@ class PlanConfig:
 class DriveConfig:
     """How the vehicle is driven."""
 
-    lateral_mps2: float = 2.0  # in bends; passengers accept 2.5
-    acceleration_mps2: float = 1.8
+    lateral_mps2: float = 2.5  # in bends, as passengers accept and recorded drives have it
+    acceleration_mps2: float = 2.4  # as the briskest of SUMO's cars here
     braking_mps2: float = 2.0  # planned braking
     firm_braking_mps2: float = 4.0  # braking for what could not be foreseen; up to there one stops before a junction
     speed_share: float = 0.97  # of the speed limit: the speed is known to a few per cent only
@@ -53,7 +53,7 @@ class DriveConfig:
     doubt_mps: float = 4.0  # while the place is doubted
     unsure_m: float = 2.0  # standard deviation of the position from which on the vehicle slows down
     doubt_sigma_m: float = 3.0  # and from which on it doubts its place
-    yaw_rate_radps: float = 0.5  # tight turns are driven slowly enough to turn the wheels in time
+    yaw_rate_radps: float = 0.6  # tight turns are driven slowly enough to turn the wheels in time
     creep_mps: float = 1.2
     error_decay_m: float = 3.0  # distance over which an offset from the path fades at low speed
     error_decay_s: float = 0.6  # and the time it takes at least
@@ -61,6 +61,7 @@ class DriveConfig:
     speed_gain_1ps: float = 1.5
     headway_s: float = 1.4  # of the intelligent driver model (Treiber, Hennecke and Helbing, 2000)
     jam_gap_m: float = 2.5  # and its gap at rest
+    following_mps2: float = 1.8  # and its acceleration: gentler than on a free road
     stop_before_m: float = 1.8  # the bumper stands so far before the end of the lane: a stop line begins .9 m before it
     goal_tolerance_m: float = 0.5  # the rear axle is held to stand at the goal within this
     goal_sigma_m: float = 1.5  # an arrival is said only if the position is known this well: twice that is the goal's 3 m

@@ -12,7 +12,6 @@ from hippodrome.core.navigation.speed import stopping_mps
 from hippodrome.core.navigation.types import Indicator, Lamp, Radar
 
 LOOK_S = 0.6  # braking begins so early: the speed follows the wanted one with a lag of 1 / speed_gain, .67 s
-GOAL_BRAKING_MPS2 = 1.8  # gentler than elsewhere, since the last metre counts
 CHANGE_INDICATED_M = 25.0  # before a lane change
 BARRED = "waits: somebody stands beyond the junction"
 TURN_SIGMA_M = 0.6  # a turn is driven as ever where its place along the way is known so well: a corner forgives about twice that
@@ -49,7 +48,7 @@ def pace(
         unsure = max(wanted * config.unsure_m / sigma_m, min(wanted, SLOWEST_MPS))
         wanted, reason = unsure, "slows down: the place is not known well"
     to_goal_m = course.goal_u_m - u_m
-    goal_mps = stopping_mps(to_goal_m - 0.5 * config.goal_tolerance_m, GOAL_BRAKING_MPS2)
+    goal_mps = stopping_mps(to_goal_m - 0.5 * config.goal_tolerance_m, config.braking_mps2)
     stop_m = to_goal_m - 0.5 * config.goal_tolerance_m
     if goal_mps < wanted:
         wanted, reason = goal_mps, "stops at the goal"

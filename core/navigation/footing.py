@@ -39,6 +39,11 @@ class Footing:
     off_m: float = 0.0
 
     @property
+    def is_on_road(self) -> bool:
+        """Whether all of the vehicle is on road, as far as that is known."""
+        return self.beside_m == 0.0
+
+    @property
     def is_doubtful(self) -> bool:
         """Whether a place on the road is in doubt."""
         return self.beside_m > DOUBT * BESIDE_M or self.off_m > DOUBT * OFF_M
@@ -50,9 +55,14 @@ class Footing:
 
 
 def stepped(footing: Footing, ground: Ground, distance_m: float) -> Footing:
-    """The footing after metres that were driven forward; backing off is not counted."""
+    """The footing after metres that were driven forward; backing off is not counted.
+
+    Who has come off the road is beside it until he has backed: a pavement beyond the kerb looks like road.
+    """
     if distance_m <= 0.0:
         return footing
+    if footing.is_off_road:
+        return Footing(min(footing.beside_m + distance_m, 2.0 * BESIDE_M), footing.off_m)
     share = float(np.mean(ground.kinds_at(BODY) == OTHER))
     beside_m = footing.beside_m + (distance_m if share > BESIDE else -distance_m)
     off_m = footing.off_m + (distance_m if share > OFF else -distance_m)

@@ -31,7 +31,7 @@ from hippodrome.core.navigation.places import Place
 from hippodrome.core.navigation.placing import keeps_left, lane_of
 from hippodrome.core.navigation.searching import search_step
 from hippodrome.core.navigation.senses import Senses
-from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2
+from hippodrome.core.navigation.speed import approach_mps2, following_mps2, stop_mps2, there_mps2
 from hippodrome.core.navigation.steering import path_curvature_1pm, steering_rad
 from hippodrome.core.navigation.streets import StreetMemory
 from hippodrome.core.navigation.track import Track
@@ -270,6 +270,7 @@ class Navigator:
             return self._to_turn() if plan.turns else self._standing(*self._arrival.at_goal(dt_s))
         accel = min(approach_mps2(speed, wanted, config.drive), following_mps2(speed, radar, config.drive, config.vehicle))
         accel = min(accel, stop_mps2(speed, step.to_stop_m, config.drive, config.vehicle))
+        accel = min(accel, there_mps2(plan.to_goal_m, config.drive))
         if wanted <= 0.0 and speed < STANDING_MPS:
             accel = HOLD_MPS2
         bend = path_curvature_1pm(plan.course, plan.u_m, self._belief.track.pose, speed, config.drive)

@@ -37,7 +37,7 @@ PATIENT_S, ROOM_LESS_MPS = 3.0, 0.1  # who stands longer without a way takes les
 STOOD_S, STANDS_MPS, TURNED_RAD = 0.5, 0.3, 0.1  # who has stood so long turns the wheels before going on
 WHEEL_RATE_RADPS = 0.6  # at which a way's curvature is followed; the wheels can do .9
 LAG_S = 0.6  # with which the speed follows the wanted one: 1 / speed_gain
-SEARCH_LATERAL = 0.6  # of the lateral acceleration: corners that nobody knows are taken slowly
+SEARCH_LATERAL = 0.5  # of the lateral acceleration: corners that nobody knows are taken slowly
 BLIND_M = 5.0  # the way is driven so far without a border beside it, at walking pace
 SURE_M2 = 0.03  # variance of an offset in the lane that is steered by
 

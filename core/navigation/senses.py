@@ -77,7 +77,7 @@ class Senses:
         distance_m = scale * observation.speed * observation.dt_s
         self.ground.move(distance_m, observation.yaw_rate_radps * observation.dt_s)
         if observation.frame is not None:
-            self.ground.see(observation.frame, radar.gap_m)
+            self.ground.see(observation.frame, radar.gap_m, self.footing.is_on_road)
         self.footing = footings.stepped(self.footing, self.ground, distance_m)
         return distance_m
 

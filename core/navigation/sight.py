@@ -17,10 +17,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from hippodrome.core.navigation import sweep
+from hippodrome.core.navigation.asphalt import followed, hidden, kinds_of
 from hippodrome.core.navigation.border import (
     CELL_M,
     OTHER,
-    PAINT,
     REACH_M,
     ROAD,
     STEP_M,
@@ -37,10 +37,9 @@ from hippodrome.core.views.config import CameraGeometry
 CELLS = 400  # along each side: 80 m, in which the vehicle is kept 20 m away from the rim
 SHIFT_M = 20.0
 FAR_M = 12.0  # a pixel farther away spans more than a metre
-DARKEST, BRIGHTEST, PAINT_LEVEL = 0.45, 1.38, 1.7  # levels relative to the asphalt right ahead: shade, kerbstones, paint
-COLOURFUL = 0.16  # difference between a pixel's colours, relative to its level, from which on it is grass
+VIEW_SHARE = 0.9  # of the camera's view to either side, beyond which the ground may be seen, or not
+SIGHTS, HIDING = 40, 3  # places on a line of sight; so many of them that are no road hide what lies beyond
 PATCH_M = (5.5, 0.9)  # the asphalt right ahead: so far ahead of the rear axle and to either side
-STEADY = 0.85  # weight of the past in the level of the asphalt
 
 FITS_SHARE = 0.1  # of a path that may seem to be no road: its cells are as coarse as that
 SHIFT_STEP_M = 0.5
@@ -115,30 +114,25 @@ class Ground:
         self._origin_m = self._origin_m.copy()
         self._origin_m[axis] += cells * CELL_M
 
-    def see(self, frame: Frame, gap_m: float) -> None:
-        """Enter a frame; what lies beyond the next vehicle ahead, ``gap_m`` from the bumper, is hidden."""
+    def see(self, frame: Frame, gap_m: float, on_road: bool = True) -> None:
+        """Enter a frame; what lies beyond the next vehicle ahead, ``gap_m`` from the bumper, is hidden.
+
+        Of a vehicle that is not ``on_road`` with all of it, what lies ahead may be no asphalt, and its level is not followed.
+        """
         if self._view is None or self._view.ahead_m.shape[1] != frame.shape[1]:
             self._view = ground_view(self._camera, frame.shape[1], frame.shape[0])
             self._stand()
         view = self._view
         part = frame[view.rows].astype(np.float32)
         level = part.mean(axis=2) if part.ndim == 3 else part
+        colour = (part.max(axis=2) - part.min(axis=2)) / np.maximum(level, 1.0) if part.ndim == 3 else np.zeros_like(level)
         patch = (view.ahead_m < PATCH_M[0]) & (np.abs(view.left_m) < PATCH_M[1])
-        here = float(np.median(level[patch]))
-        usual = here if math.isnan(self._level) else self._level
-        if 0.5 < here / max(usual, 1.0) < 1.5:
-            self._level = STEADY * usual + (1.0 - STEADY) * here
-        relative = level / max(self._level, 1.0)
-        kind = np.where((relative > DARKEST) & (relative < BRIGHTEST), ROAD, OTHER).astype(np.uint8)
-        if part.ndim == 3:
-            colour = (part.max(axis=2) - part.min(axis=2)) / np.maximum(level, 1.0)
-            kind[colour > COLOURFUL] = OTHER
-            kind[(relative > PAINT_LEVEL) & (colour < COLOURFUL)] = PAINT
-        else:
-            kind[relative > PAINT_LEVEL] = PAINT
-        hidden = _hidden(kind)
-        kind[hidden & (kind != OTHER)] = UNKNOWN
-        kind[:-THICK_PX][hidden[THICK_PX:]] = UNKNOWN
+        if on_road or math.isnan(self._level):
+            self._level = followed(self._level, level, colour, patch)
+        kind = kinds_of(level / max(self._level, 1.0), colour)
+        behind = hidden(kind)
+        kind[behind & (kind != OTHER)] = UNKNOWN
+        kind[:-THICK_PX][behind[THICK_PX:]] = UNKNOWN
         reach = min(FAR_M + self._camera.forward_m, gap_m + 2.6)
         near = (view.ahead_m < reach) & (kind != UNKNOWN)
         _enter(self._cells, self._origin_m, self.pose, view.ahead_m[near], view.left_m[near], kind[near])
@@ -227,6 +221,16 @@ class Ground:
                     best = shift_m, share
         return best
 
+    def in_view(self, points_m: FloatArray) -> NDArray[np.bool_]:
+        """Whether points (n, 2) in the vehicle's axes can be seen from here: nothing that is no road lies before them."""
+        camera_m = np.array([self._camera.forward_m, 0.0])
+        apart_m = points_m - camera_m
+        shown = np.abs(apart_m[:, 1]) < VIEW_SHARE * math.tan(0.5 * math.radians(self._camera.fov_deg)) * apart_m[:, 0]
+        sights = camera_m + np.linspace(0.0, 1.0, SIGHTS, endpoint=False)[:, None, None] * apart_m
+        before = self.kinds_at(sights.reshape(-1, 2)).reshape(SIGHTS, -1)
+        seen: NDArray[np.bool_] = shown & (np.sum(before == OTHER, axis=0) < HIDING)
+        return seen
+
     def off_road_share(self, points_m: FloatArray) -> float:
         """Which share of points (n, 2) in the vehicle's axes is known to be no road, of those that are known."""
         kind = self.kinds_at(points_m)
@@ -244,15 +248,6 @@ class Ground:
         kind = np.full(len(points_m), UNKNOWN, dtype=np.uint8)
         kind[inside] = self._cells[i[inside], j[inside]]
         return kind
-
-
-def _hidden(kind: UInt8Array) -> NDArray[np.bool_]:
-    """Pixels (h, w) above a stretch of no road in their column: a grey wall behind the pavement looks like asphalt beyond it."""
-    other = kind[::-1] == OTHER
-    begins = np.zeros(kind.shape, dtype=np.bool_)
-    begins[2:] = other[:-2] & other[1:-1] & other[2:]
-    hidden: NDArray[np.bool_] = np.maximum.accumulate(begins, axis=0)[::-1]
-    return hidden
 
 
 @njit(cache=True)

@@ -37,9 +37,9 @@ def following_mps2(speed_mps: float, radar: Radar, config: DriveConfig, vehicle:
     if radar.blind or not math.isfinite(radar.gap_m):
         return math.inf
     gap_m, closing = max(radar.gap_m, LEAST_GAP_M), radar.closing_mps
-    root = 2.0 * math.sqrt(config.acceleration_mps2 * config.braking_mps2)
+    root = 2.0 * math.sqrt(config.following_mps2 * config.braking_mps2)
     wanted_m = config.jam_gap_m + max(0.0, speed_mps * config.headway_s + speed_mps * closing / root)
-    accel = config.acceleration_mps2 * (1.0 - (wanted_m / gap_m) ** 2)
+    accel = config.following_mps2 * (1.0 - (wanted_m / gap_m) ** 2)
     if closing > 0.0 and closing**2 > 2.0 * config.firm_braking_mps2 * max(gap_m - 1.0, 0.1):
         return -vehicle.max_braking_mps2
     return max(accel, -vehicle.max_braking_mps2)
@@ -51,3 +51,11 @@ def stop_mps2(speed_mps: float, to_stop_m: float, config: DriveConfig, vehicle: 
     if not math.isfinite(to_stop_m) or needed < BEGUN_SHARE * config.braking_mps2:
         return math.inf
     return -min(needed, vehicle.max_braking_mps2)
+
+
+def there_mps2(to_goal_m: float, config: DriveConfig) -> float:
+    """What stops a vehicle that is at its goal, within the tolerance; else infinite.
+
+    The speed follows the wanted one with a lag, so that the last hand's breadths would take a second and more.
+    """
+    return -config.braking_mps2 if to_goal_m < config.goal_tolerance_m else math.inf

@@ -82,6 +82,12 @@ def begun(pose: FloatArray, covariance: FloatArray) -> Track:
     return Track(np.array(pose, dtype=np.float64), whole)
 
 
+def widened(covariance: FloatArray, pose: FloatArray, along_m: float, across_m: float, heading_rad: float) -> FloatArray:
+    """The covariance (3, 3) of a pose (3,) that has errors of these standard deviations beside."""
+    wider: FloatArray = covariance + _turned(float(pose[2]), along_m**2, across_m**2, heading_rad**2)
+    return wider
+
+
 def moved(track: Track, distance_m: float, turned_rad: float, scale_sigma: float = SCALE_SIGMA) -> Track:
     """The track after a short arc, of whose length the logarithm has a standard deviation ``scale_sigma``."""
     chord, distance_m = track.pose[2] + 0.5 * turned_rad, distance_m * math.exp(scale_sigma * track.metres_off)

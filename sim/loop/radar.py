@@ -17,6 +17,8 @@ from hippodrome.sim.loop.users import Users
 
 REACH_M: Final = 100.0  # of an ordinary 77 GHz radar, in town
 BESIDE_M: Final = 0.3  # so much room is kept on each side of the ego's own swept path
+STANDING_BESIDE_M: Final = 0.05  # and so much to who stands, where the ego hardly moves: both would wait for each other
+SLOW_MPS, FAST_MPS = 0.5, 2.0  # up to where it hardly moves; the room grows up to where it is fast: its wheels turn meanwhile
 SWING_BESIDE_M: Final = -0.1  # and so much where a corner swings out beyond that: in bends one passes others by a hand
 MOST_TURN_RAD: Final = 0.5 * math.pi  # the swept path ends where it has turned by a right angle
 GAP_NOISE_M: Final = 0.1  # standard deviations of a measurement
@@ -33,6 +35,7 @@ def nearest_ahead(
     middle_m: float = CENTRE_AHEAD_M,
     bumper_m: float = REAR_AXLE_TO_FRONT_M,
     tail_m: float = LENGTH_M - REAR_AXLE_TO_FRONT_M,
+    own_mps: float = math.inf,
 ) -> tuple[float, float]:
     """Gap [m] from the front bumper along the swept path to the nearest road user, and that one's speed along it.
 
@@ -56,7 +59,7 @@ def nearest_ahead(
         apart = np.maximum(np.hypot(forward, radius - left), 1e-9)
         aside = radius - np.sign(radius) * apart
         swung = along - _outer_m(apart, abs(radius), bumper_m, tail_m)
-    inside = (np.abs(aside) <= 0.5 * WIDTH_M + BESIDE_M) & (along > middle_m) & (along < far + bumper_m)
+    inside = (np.abs(aside) <= 0.5 * WIDTH_M + _beside_m(users, own_mps)) & (along > middle_m) & (along < far + bumper_m)
     swings = ~inside & (swung > 0.0) & (swung < far)
     along, inside = np.where(swings, swung + bumper_m, along), inside | swings
     if not inside.any():
@@ -67,6 +70,14 @@ def nearest_ahead(
     direction = pose_m[2] + curvature_1pm * place
     speed = float(users.speed_mps[user]) * math.cos(float(users.poses_m[user, 2]) - direction)
     return max(place - bumper_m, 0.0), speed
+
+
+def _beside_m(users: Users, own_mps: float) -> FloatArray:
+    """The room (k, 1) that is kept beside the ego's swept path, to each user."""
+    hurry = min(max((own_mps - SLOW_MPS) / (FAST_MPS - SLOW_MPS), 0.0), 1.0)
+    to_standing_m = STANDING_BESIDE_M + hurry * (BESIDE_M - STANDING_BESIDE_M)
+    room_m: FloatArray = np.where(users.speed_mps > MOVES_MPS, BESIDE_M, to_standing_m)[:, None]
+    return room_m
 
 
 def _outer_m(apart_m: FloatArray, radius_m: float, bumper_m: float, tail_m: float) -> FloatArray:

@@ -233,7 +233,7 @@ class World:
     def _sensed(self, travelled_m: float, turned_rad: float) -> Sensed:
         truth, pose = self._truth, self._truth.pose_m
         speed, yaw_rate = self._odometry.sense(travelled_m / self._level(), turned_rad, STEP_S)
-        gap, other = nearest_ahead(pose, self._car.curvature_1pm, self._users)
+        gap, other = nearest_ahead(pose, self._car.curvature_1pm, self._users, own_mps=self._car.speed_mps)
         radar = measured(gap, other, self._car.speed_mps, self._ahead.way_is_free, self._ahead.lamp, self._rng_radar)
         radar = with_surroundings(radar, pose, self._car.curvature_1pm, self._users, self._rng_around)
         frame: Frame | None = None

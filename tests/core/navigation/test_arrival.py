@@ -51,6 +51,7 @@ def test_who_does_not_know_it_looks_at_the_end_of_the_street_and_backs_to_before
     arrival, belief, backed = at_goal(70.0)
     assert stood(arrival, 1.2) is DrivingState.DOUBTING and not arrival.arrived
     assert arrival.looks(belief.plan)
+    belief.track.along_sigma_m = 1.4  # known well enough to say so, but not to back first and say so then
     assert drive_on(arrival, belief, 90.0) is None
     assert belief.track.pose[0] == pytest.approx(SIDE_END_M - 8.5, abs=0.6)
     assert backed == [pytest.approx(belief.track.pose[0] - 70.0 + 2.5, abs=0.3)] and belief.plan is None
@@ -64,6 +65,13 @@ def test_it_looks_no_farther_than_is_needed():
     assert arrival.look_mps(belief.plan, 0.0, Radar()) is None and backed == [pytest.approx(2.5, abs=0.3)]
 
 
+def test_it_does_not_back_where_the_end_of_the_street_told_nothing():
+    arrival, belief, backed = at_goal(70.0)
+    stood(arrival, 1.2)
+    assert drive_on(arrival, belief, 90.0) == LOOK_MPS
+    assert not backed and not arrival.looks(belief.plan) and belief.plan is not None
+
+
 @pytest.mark.parametrize("goal_m", [40.0, 83.0])
 def test_it_does_not_look_where_the_end_is_far_or_was_seen(goal_m):
     arrival, belief, _ = at_goal(goal_m)
@@ -74,6 +82,8 @@ def test_it_does_not_look_where_the_end_is_far_or_was_seen(goal_m):
 def test_with_somebody_behind_it_drives_round_and_does_not_look_twice():
     arrival, belief, backed = at_goal(70.0, is_free_behind=False)
     stood(arrival, 1.2)
+    belief.track.along_sigma_m = 1.4
     assert drive_on(arrival, belief, 90.0) == LOOK_MPS
+    belief.track.along_sigma_m = 2.0
     assert len(backed) == 1 and not arrival.looks(belief.plan) and belief.plan is not None
     assert stood(arrival, 1.2) is DrivingState.DOUBTING and not arrival.looks(belief.plan)

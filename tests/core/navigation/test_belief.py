@@ -6,6 +6,7 @@ import pytest
 from hippodrome.core.navigation.belief import Belief
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.pilot import RoutePlanner
+from hippodrome.core.navigation.places import Place
 from hippodrome.core.navigation.senses import Senses
 from hippodrome.core.navigation.track import begun, is_elsewhere
 from hippodrome.core.navigation.types import Radar
@@ -48,3 +49,15 @@ def test_another_lane_is_another_place_and_a_little_farther_on_is_not(ahead_m, a
     estimate.pose[:2] += ahead_m, aside_m
     track = begun(np.array([20.0, 0.0, 0.0]), np.diag([0.04, 0.04, 1e-4]))
     assert is_elsewhere(track, estimate) is elsewhere
+
+
+def test_a_place_by_the_road_network_is_known_to_a_metre_along_the_way_and_better_across():
+    network, car = ring(side=300.0), Bicycle((300.0, 40.0, 0.5 * np.pi))
+    config = NavigatorConfig(read_road=False)
+    belief, senses = Belief(config, RoutePlanner(map_along(network), network, config), -1.0), Senses(config, -1.0, 1.0)
+    observation = car.sense(frame=None)
+    distance_m = senses.step(observation, Radar(), 1.0)
+    found = Place(np.array(car.pose), np.diag([0.01, 0.01, 1e-4]), 1.0, 1.0)
+    belief.step(observation, car.step(observation), distance_m, senses, found)
+    deviations_m = np.sqrt(np.diag(belief.track.covariance)[:2])
+    assert deviations_m[1] > 1.0 and deviations_m[0] < 0.3 and belief.track.along_sigma_m == pytest.approx(deviations_m[1], 1e-3)

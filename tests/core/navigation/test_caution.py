@@ -14,11 +14,14 @@ AHEAD = np.column_stack([np.arange(1.0, 14.0, 0.5), np.zeros(26), np.zeros(26)])
 class Town:
     """Ground that is told by a function of place in the vehicle's axes."""
 
-    def __init__(self, kind):
-        self.kind = kind
+    def __init__(self, kind, is_shown=lambda x, y: True):
+        self.kind, self.is_shown = kind, is_shown
 
     def kinds_at(self, points_m):
         return np.array([self.kind(x, y) for x, y in points_m], dtype=np.uint8)
+
+    def in_view(self, points_m):
+        return np.array([self.is_shown(x, y) for x, y in points_m])
 
     def off_road_share(self, points_m):
         kinds = self.kinds_at(points_m)
@@ -51,3 +54,19 @@ def test_a_way_seems_road_where_enough_of_it_was_seen():
     assert seems_road(Town(lambda x, y: ROAD), AHEAD)
     assert not seems_road(Town(lambda x, y: ROAD if x < 4.0 else UNKNOWN), AHEAD)
     assert not leads_off_road(Town(lambda x, y: ROAD), AHEAD[:2])
+
+
+def test_of_a_sharp_corner_counts_what_the_camera_can_show():
+    bend = -0.32 * np.clip(np.arange(2.0, 8.1, 0.5) - 3.0, 0.0, None)  # to the right, at full lock
+    corner = np.column_stack([2.0 + np.cumsum(0.5 * np.cos(bend)), np.cumsum(0.5 * np.sin(bend)), bend])
+
+    def is_shown(x, y):
+        return y > -1.2
+
+    def seen(x, y):
+        return ROAD if is_shown(x, y) else UNKNOWN
+
+    assert not seems_road(Town(seen), corner) and seems_road(Town(seen, is_shown), corner)
+    assert not seems_road(Town(lambda x, y: UNKNOWN if x > 4.5 else seen(x, y), is_shown), corner)
+    assert not seems_road(Town(lambda x, y: OTHER if x > 5.5 else seen(x, y), is_shown), corner)
+    assert not seems_road(Town(lambda x, y: ROAD if x < 3.0 else UNKNOWN, lambda x, y: x < 3.0), corner)

@@ -53,6 +53,14 @@ def test_what_was_driven_on_road_since_makes_up_for_it():
     assert footing_after(Strip(-1.5), 12.0, footing_after(Strip(-0.6), 9.0)) == Footing()
 
 
+def test_a_pavement_that_looks_like_road_does_not_make_up_for_having_come_off_it():
+    off = footing_after(Strip(-0.6), BESIDE_M + 1.0)
+    assert footing_after(Strip(-1.5), 4.0, off).is_off_road
+    assert footing_after(Strip(-1.5), 50.0, off).beside_m == 2.0 * BESIDE_M
+    assert stepped(off, Strip(-1.5), -1.0) == off
+    assert not off.is_on_road and ON_ROAD.is_on_road
+
+
 def test_neither_unknown_ground_nor_backing_off_tells_anything():
     class Dark:
         def kinds_at(self, points_m):

@@ -140,6 +140,17 @@ def test_the_ground_below_the_car_is_road_from_the_first_frame_on():
     assert way.free_m == math.inf and way.seen_m > 3.0
 
 
+def test_beside_the_road_what_lies_ahead_is_not_taken_for_asphalt():
+    after = []
+    for on_road in (True, False):
+        ground = Ground(CameraGeometry())
+        ground.see(np.full((120, 160, 3), 100, dtype=np.uint8), math.inf)
+        for _ in range(20):
+            ground.see(np.full((120, 160, 3), 130, dtype=np.uint8), math.inf, on_road)
+        after.append(ground._level)
+    assert after[0] > 125.0 and after[1] == 100.0
+
+
 def test_behind_a_kerb_there_is_no_road_and_round_its_end_the_border_goes_on_half_way():
     part = cells()
     part[:80, :40] = UNKNOWN
@@ -183,3 +194,13 @@ def test_who_is_late_for_a_corner_turns_at_once_and_a_line_without_one_stays_as_
     assert led[6, 2] < -0.2 and not np.allclose(led[:, :2], late[:, :2])
     assert len(bends_of(led, np.zeros((160, 160)), CORNER, CELL_M, 0.9, 20)) == 0
     assert np.array_equal(rounded(straight_line(), 0.0, -1.0, field_of(barrier), CORNER, CELL_M), straight_line())
+
+
+def test_what_lies_behind_no_road_or_beside_the_view_cannot_be_seen():
+    ground = Ground(CameraGeometry())
+    points = np.array([[4.5, -1.0], [4.5, -4.0], [4.5, 2.0], [2.0, 3.0], [0.5, 0.0]])
+    np.testing.assert_array_equal(ground.in_view(points), [True, False, True, False, False])
+    ahead_right = np.array([[4.5, -2.5]])
+    assert ground.in_view(ahead_right).all()
+    ground._fill(-2.3, -1.2, OTHER)  # a pavement to the right, up to 3.9 m ahead
+    assert not ground.in_view(ahead_right).any() and ground.in_view(points[:1]).all()

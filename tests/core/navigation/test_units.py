@@ -14,7 +14,7 @@ from hippodrome.core.navigation.driving import pace
 from hippodrome.core.navigation.junctions import gate_speed_mps, room_to_stop_m
 from hippodrome.core.navigation.searching import LaneMemory
 from hippodrome.core.navigation.senses import Senses
-from hippodrome.core.navigation.speed import can_stop, following_mps2, stop_mps2, stopping_mps
+from hippodrome.core.navigation.speed import can_stop, following_mps2, stop_mps2, stopping_mps, there_mps2
 from hippodrome.core.navigation.steering import lane_curvature_1pm, steering_rad
 from hippodrome.core.navigation.types import Lamp, Radar
 from hippodrome.core.navigation.watch import SensorHealth, watched
@@ -36,7 +36,7 @@ def test_samsons_law_steers_back_to_the_lane():
 def test_the_wheels_stand_as_the_bicycle_needs_them_and_never_beyond_their_stop():
     assert steering_rad(0.1, 1.0, DRIVE, VEHICLE) == pytest.approx(math.atan(0.27))
     assert steering_rad(9.0, 0.0, DRIVE, VEHICLE) == VEHICLE.max_steering_rad
-    assert steering_rad(0.3, 10.0, DRIVE, VEHICLE) == pytest.approx(math.atan(2.7 * 0.03))
+    assert steering_rad(0.3, 10.0, DRIVE, VEHICLE) == pytest.approx(math.atan(2.7 * 0.0375))
 
 
 def test_stopping_is_half_of_the_speed_squared_over_the_braking():
@@ -44,12 +44,13 @@ def test_stopping_is_half_of_the_speed_squared_over_the_braking():
     assert can_stop(4.0, 4.0, 2.0) and not can_stop(3.9, 4.0, 2.0)
     assert stop_mps2(4.0, 4.0, DRIVE, VEHICLE) == pytest.approx(-2.0)
     assert math.isinf(stop_mps2(4.0, 40.0, DRIVE, VEHICLE)) and math.isinf(stop_mps2(4.0, math.inf, DRIVE, VEHICLE))
+    assert there_mps2(0.4, DRIVE) == -DRIVE.braking_mps2 and math.isinf(there_mps2(0.6, DRIVE))
 
 
 def test_the_intelligent_driver_model_holds_its_gap():
     wanted = DRIVE.jam_gap_m + 10.0 * DRIVE.headway_s
     assert following_mps2(10.0, Radar(wanted, 0.0), DRIVE, VEHICLE) == pytest.approx(0.0)
-    assert following_mps2(10.0, Radar(0.5 * wanted, 0.0), DRIVE, VEHICLE) == pytest.approx(-3.0 * DRIVE.acceleration_mps2)
+    assert following_mps2(10.0, Radar(0.5 * wanted, 0.0), DRIVE, VEHICLE) == pytest.approx(-3.0 * DRIVE.following_mps2)
     assert math.isinf(following_mps2(10.0, Radar(), DRIVE, VEHICLE))
     assert following_mps2(10.0, Radar(8.0, 10.0), DRIVE, VEHICLE) == -VEHICLE.max_braking_mps2
 

@@ -44,6 +44,9 @@ class Eyes:
         cells = np.clip(cells, 0, np.array(self._raster.levels.shape) - 1)
         return np.where(self._raster.levels[cells[:, 0], cells[:, 1]] > 2, 1, 2).astype(np.uint8)
 
+    def in_view(self, points_m):
+        return np.ones(len(points_m), dtype=bool)
+
     def off_road_share(self, points_m):
         return float(np.mean(self.kinds_at(points_m) == 2)) if self._raster is not None else 0.0
 

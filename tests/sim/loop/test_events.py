@@ -13,6 +13,7 @@ from hippodrome.sim.loop.radar import nearest_ahead, nearest_behind_m
 from hippodrome.sim.loop.types import EventKind, LanePlace
 from hippodrome.sim.loop.users import Users
 from hippodrome.sim.loop.world import World
+from hippodrome.sim.traffic import VEHICLE_SIZES_M
 from tests.sim.loop import small
 
 
@@ -174,6 +175,19 @@ def test_the_radar_sees_whom_the_outer_corner_swings_into():
     assert nearest_behind_m(pose, 0.0, beside) == math.inf
     assert nearest_behind_m(pose, lock, beside) < 2.0
     assert nearest_behind_m(pose, lock, users(1.5, -4.5)) == math.inf
+
+
+def test_who_waits_is_passed_by_a_hands_breadth_where_the_ego_hardly_moves():
+    def gap(aside_m, other_mps, own_mps):
+        users = Users(("a",), np.array([1]), np.array([0], np.uint8), np.array([[12.0, aside_m, 0.0]]), np.array([other_mps]))
+        return nearest_ahead((0.0, 0.0, 0.0), 0.0, users, own_mps=own_mps)[0]
+
+    beside_m = 0.5 * (1.8 + float(VEHICLE_SIZES_M[0, 1]))
+    assert gap(beside_m + 0.1, 0.0, 0.2) == math.inf
+    assert gap(beside_m + 0.0, 0.0, 0.2) < 10.0
+    assert gap(beside_m + 0.1, 2.0, 0.2) < 10.0  # who drives has the whole room
+    assert gap(beside_m + 0.1, 0.0, 2.0) < 10.0  # and so has who stands, where the ego is faster
+    assert gap(beside_m + 0.2, 0.0, 1.9) < 10.0 and gap(beside_m + 0.2, 0.0, 1.0) == math.inf
 
 
 def test_who_is_in_another_junction_is_as_far_as_the_road_between_is_long(tmp_path):

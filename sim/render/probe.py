@@ -64,7 +64,10 @@ def _answer(child: subprocess.Popen[str]) -> tuple[bool, str]:
     try:
         out, complaint = child.communicate(timeout=TIMEOUT_S)
     except subprocess.TimeoutExpired:
-        return False, f"OpenGL does not answer within {TIMEOUT_S:.0f} s; check the graphics driver"
+        return (
+            False,
+            f"OpenGL does not answer within {TIMEOUT_S:.0f} s; check the graphics driver, and whether the machine is very busy",
+        )
     answer = [line.removeprefix(DRAWN) for line in out.splitlines() if line.startswith(DRAWN)]
     if child.returncode == 0 and answer:
         return True, answer[-1]

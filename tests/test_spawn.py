@@ -114,6 +114,25 @@ def test_a_signal_that_comes_while_it_is_blocked_is_heard_afterwards():
         signal.signal(signal.SIGUSR1, kept)
 
 
+def test_a_signal_that_another_thread_takes_is_heard_afterwards():
+    heard = []
+    kept = signal.signal(signal.SIGUSR1, lambda number, _: heard.append(number))
+    try:
+        with signals_blocked([signal.SIGUSR1]):
+            other = threading.Thread(target=_take_a_signal)
+            other.start()
+            other.join(LIMIT_S)
+            assert heard == []
+        assert heard == [signal.SIGUSR1]
+    finally:
+        signal.signal(signal.SIGUSR1, kept)
+
+
+def _take_a_signal():
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGUSR1])
+    signal.raise_signal(signal.SIGUSR1)
+
+
 def test_tokens_let_so_many_in_and_one_more_for_each_that_leaves():
     tokens = _Tokens(2)
     assert tokens.acquire() and not tokens._is_zero() and tokens.acquire(timeout=1.0)

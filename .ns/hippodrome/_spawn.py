@@ -12,9 +12,9 @@ import os
 import signal
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import connection, resource_tracker
 from multiprocessing.context import SpawnContext
 from typing import Any, Final, TypeVar
@@ -48,12 +48,27 @@ class SpawnPool(ProcessPoolExecutor):
 
 
 @contextmanager
-def signals_blocked(numbers: Iterable[int]) -> Iterator[None]:
-    """Within the block this thread, and the processes that it starts, do not hear these signals; they come when it ends."""
+def signals_blocked(numbers: Collection[int]) -> Iterator[None]:
+    """Within the block this thread, and the processes that it starts, do not hear these signals; they come when it ends.
+
+    Python answers a signal in its main thread, also one that another thread took, as those of libraries do. There the answer
+    waits for the end of the block, too.
+    """
+    came: list[int] = []
+    answers: dict[int, Any] = {}
     kept = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
     try:
+        with suppress(ValueError):  # not the main thread: nothing interrupts it
+            for number in numbers:
+                if callable(answer := signal.getsignal(number)):
+                    signal.signal(number, lambda taken, _frame: came.append(taken))
+                    answers[number] = answer
         yield
     finally:
+        for number, answer in answers.items():
+            signal.signal(number, answer)
+        for number in came:
+            signal.raise_signal(number)
         signal.pthread_sigmask(signal.SIG_SETMASK, kept)
 
 

@@ -228,4 +228,5 @@ def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
     for number in ASKING:
         signal.signal(number, signal.SIG_IGN)  # a second one must not break off the clearing away
     sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115  # until the process ends
+    atexit.unregister(_end)  # which would hide the status
     raise SystemExit(INTERRUPTED)

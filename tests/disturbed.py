@@ -172,13 +172,13 @@ class Chaos:
         good = sum(status == self.status[command] for status, _ in ends)
         if refused + good != 2 or good == 0 or any(len(one.told()) > (status == 2) for status, one in ends):
             faults.append(f"ended: a pair with {[status for status, _ in ends]}: {told}")
-        return faults + self.orphans(*both) + self.rerun(command, whole, out)
+        return faults + self.orphans(*(one.process.pid for one in both)) + self.rerun(command, whole, out)
 
     def rerun(self, command: str, whole: Path, out: Path) -> list[str]:
         """Run a command again in ``out``, of which ``whole`` has the undisturbed results; what was wrong."""
         started = self.start(command, out)
         status = self.ended(started)
-        faults = self.orphans(started)
+        faults = self.orphans(started.process.pid)
         if "Traceback" in started.said() or (status == self.status[command] and started.told()):
             faults.append(f"traceback: the rerun said {' / '.join(started.told())[-300:]}")
         return faults + self.faults_of_rerun(status, started.said(), whole, out, self.status[command])
@@ -220,7 +220,7 @@ class Chaos:
             status = self.ended(started)
             cluster.communicate("")
         faults = [] if status == 0 else [f"ended: a sweep that lost a worker with {status}: {started.said()[-300:]}"]
-        faults += self.orphans(started) + [f"orphan: {pid} of the cluster" for pid in session(cluster.pid)]
+        faults += self.orphans(started.process.pid, cluster.pid)
         return faults if met or faults else None
 
     def faults_of_end(self, started: Started, ends: tuple[int | None, ...], strict: bool = True) -> list[str]:
@@ -232,7 +232,7 @@ class Chaos:
             strict: It says nothing but the one sentence that goes with its status; otherwise it may name several things.
         """
         status = self.ended(started)
-        faults, said, told = self.orphans(started), started.said(), started.told()
+        faults, said, told = self.orphans(started.process.pid), started.said(), started.told()
         if status not in ends:
             how = "hang: the command that was hit" if status is None else f"ended: status {status}, not one of {ends}"
             faults.append(f"{how}: {said[-300:]}")
@@ -240,18 +240,19 @@ class Chaos:
             faults.append(f"traceback: status {status} with {len(told)} lines: {' / '.join(told)[-400:]}")
         return faults
 
-    def orphans(self, *started: Started) -> list[str]:
-        """The processes of commands that are there ``ORPHAN_S`` after their ends; they are killed."""
+    def orphans(self, *leaders: int) -> list[str]:
+        """The processes that are there ``ORPHAN_S`` after the leaders of their sessions have ended; they are killed."""
         end_s = time.monotonic() + ORPHAN_S
-        while (left := self._living(started)) and time.monotonic() < end_s:
+        while (left := self._living(leaders)) and time.monotonic() < end_s:
             time.sleep(0.05)
         words = [command_line(pid).replace(b"\0", b" ").decode(errors="replace")[-80:] for pid in left]
         for pid in left:
             kill(pid, "SIGKILL")
         return [f"orphan: {len(left)} processes after {ORPHAN_S:g} s: {words[:3]}"] if left else []
 
-    def _living(self, started: Sequence[Started]) -> list[int]:
-        own = [pid for one in started for pid in session(one.process.pid)]
+    def _living(self, leaders: Sequence[int]) -> list[int]:
+        """Those of the sessions, also those that have given up their variables on their way out, and all that bear the mark."""
+        own = [pid for leader in leaders for pid in session(leader)]
         return sorted({*own, *started_with(self.mark)})
 
     def faults_of_rerun(self, status: int | None, said: str, whole: Path, out: Path, expected: int | None = 0) -> list[str]:

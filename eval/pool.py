@@ -15,13 +15,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from types import FrameType
-from typing import Final, NoReturn, TypeVar
+from typing import Final, TypeVar
 
 import cv2
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from hippodrome._folders import sweep_temporary
 from hippodrome._output import terminal
 from hippodrome._processes import die_with_parent, end_children
 from hippodrome._spawn import ASKING, SpawnPool, hear_signals, signals_blocked
@@ -31,7 +31,6 @@ from hippodrome.eval.files.progress import Teller
 # In this time an executor's thread forgets the tasks that were cancelled. CPython 3.11 stumbles over them, with a traceback, if
 # the processes are gone first.
 SETTLE_S = 0.2
-INTERRUPTED = 130  # exit status by which a shell knows a process that was interrupted
 # Signals by which a process ends that has stumbled over its own work: a library gives up, or touches memory that is not there.
 CRASHES: Final = frozenset(
     int(getattr(signal, name)) for name in ("SIGABRT", "SIGSEGV", "SIGBUS", "SIGILL", "SIGFPE") if hasattr(signal, name)
@@ -79,7 +78,7 @@ class Workers:
         begun, processes = set[Future[ResultT]](), self._alive()
         try:
             for one in tasks:  # a process may have died between two stages, which the executor says here
-                future = self.executor.submit(perform, task, one)
+                future = self.executor.submit(task, one)
                 items[future], futures[future] = one, weight(one)
             self.teller.begin(stage, len(futures))
             pending, processes = set(futures), self._alive()
@@ -89,7 +88,7 @@ class Workers:
                 for future in done:
                     self.progress.advance(bar, futures[future])
                     if (item := follow(future.result())) is not None:
-                        another = self.executor.submit(perform, task, item)
+                        another = self.executor.submit(task, item)
                         items[another], futures[another] = item, weight(item)
                         pending.add(another)
                 begun = {future for future in pending if future.running()} or begun
@@ -142,7 +141,10 @@ def worker_pool(workers: int, plan: Sequence[str] = (), folder: Path | None = No
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """``workers`` processes. They are spawned, not forked, as SUMO and GL keep state that must not be inherited."""
+    """``workers`` processes. They are spawned, not forked, as SUMO and GL keep state that must not be inherited.
+
+    After them their temporary folders are taken away, if they ended in the middle of something.
+    """
     executor = SpawnPool(workers, _quiet_worker)
     try:
         yield executor
@@ -152,6 +154,7 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
         raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
+        sweep_temporary()
 
 
 def _abandon(executor: ProcessPoolExecutor) -> None:
@@ -187,7 +190,9 @@ def one_opencv_thread() -> None:
 def _quiet_worker() -> None:
     """Set up a worker: it uses one core, as the pool is the parallelism, and what libraries print goes to standard error.
 
-    It ends when the process that started it ends, however that does, and when it is asked to.
+    It ends when the process that started it ends, however that does, and at once when it is asked to. An exception for that would
+    come up in the middle of libraries, which forget it, make an error of their own of it, or crash on it; what the process has
+    begun and not finished is taken away by the one that started it.
     """
     if (parent := multiprocessing.parent_process()) is not None and parent.pid is not None:
         die_with_parent(parent.pid)
@@ -196,7 +201,7 @@ def _quiet_worker() -> None:
     one_opencv_thread()
     for number in ASKING:
         if signal.getsignal(number) is not signal.SIG_IGN:  # a shell lets commands in the background ignore interrupts
-            signal.signal(number, _leave)
+            signal.signal(number, signal.SIG_DFL)
     sys.stdout = sys.stderr
     hear_signals()
     atexit.register(_end)
@@ -206,27 +211,3 @@ def _end() -> None:
     """The end of a worker that has nothing left to do: Python would go through all of its objects, which takes half a second."""
     sys.stderr.flush()
     os._exit(0)
-
-
-def perform(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT:
-    """Run ``task`` on ``item`` in a worker. If it is interrupted, the task clears away what it has begun, and the process ends.
-
-    Without this, the executor would take the exit for a failure of the task and begin the next one.
-    """
-    try:
-        return task(item)
-    except SystemExit:
-        os._exit(INTERRUPTED)
-
-
-def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
-    """End a worker without a traceback: an interrupt from the keyboard reaches every process, and the main one reports it.
-
-    Nothing that follows may print either: a worker between two tasks may find a message in the queue that another one has left
-    half read, and would complain.
-    """
-    for number in ASKING:
-        signal.signal(number, signal.SIG_IGN)  # a second one must not break off the clearing away
-    sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115  # until the process ends
-    atexit.unregister(_end)  # which would hide the status
-    raise SystemExit(INTERRUPTED)

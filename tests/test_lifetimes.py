@@ -27,18 +27,39 @@ from hippodrome.eval.commands.boundary import machine_fault
 POOL = """
 import os, signal, sys, time
 from hippodrome._processes import ending_like_an_interrupt
-from hippodrome.eval.pool import perform, worker_pool
+from hippodrome.eval.pool import worker_pool
 if __name__ == "__main__":
     try:
         with ending_like_an_interrupt(), worker_pool(2) as pool:
             pids = {pool.executor.submit(os.getpid).result() for _ in range(20)}
-            busy = [pool.executor.submit(perform, time.sleep, 60.0) for _ in range(2)]
+            busy = [pool.executor.submit(time.sleep, 60.0) for _ in range(2)]
             while not all(one.running() for one in busy):
                 time.sleep(0.01)
             print(*pids, flush=True)
             pool.run("wait", time.sleep, 4 * [60.0])
     except KeyboardInterrupt as error:
         sys.exit(128 + getattr(error, "number", signal.SIGINT))
+"""
+UNFINISHED = """
+import sys, time
+from pathlib import Path
+from hippodrome._files import replacing
+from hippodrome._folders import temporary_folder, written_by_one
+from hippodrome._processes import ending_like_an_interrupt
+from hippodrome.eval.pool import worker_pool
+
+def hold(out):
+    with temporary_folder() as one, replacing(out / "a.json") as two:
+        print(one, two, sep="\\n", file=sys.__stdout__, flush=True)
+        time.sleep(60.0)
+
+if __name__ == "__main__":
+    out = Path(sys.argv[1])
+    try:
+        with ending_like_an_interrupt(), written_by_one(out), worker_pool(1) as pool:
+            pool.run("hold", hold, [out])
+    except KeyboardInterrupt as error:
+        sys.exit(128 + error.number)
 """
 HOLDER = """
 import sys, time
@@ -140,6 +161,32 @@ def test_a_signal_ends_as_an_interrupt_does_unless_it_is_ignored(number):
             signal.raise_signal(number)
     finally:
         signal.signal(number, signal.SIG_DFL)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_after_a_signal_an_error_that_a_library_makes_of_it_is_the_signal(number):
+    def convert(_):
+        try:
+            signal.raise_signal(number)
+        except KeyboardInterrupt:
+            raise ValueError from None
+
+    with pytest.raises(KeyboardInterrupt) as caught, ending_like_an_interrupt():
+        convert(0)
+    assert isinstance(caught.value.__cause__, ValueError)
+    assert isinstance(caught.value, Terminated) == (number == signal.SIGTERM)
+    with pytest.raises(ValueError), ending_like_an_interrupt():  # nothing came: it stays what it is
+        raise ValueError
+
+
+@pytest.mark.parametrize("to_all", [False, True])
+def test_nothing_is_left_of_what_workers_were_at_when_the_command_was_asked_to_end(started, tmp_path, to_all):
+    process = started(UNFINISHED, tmp_path / "out")
+    left = [Path(process.stdout.readline().strip()) for _ in range(2)]
+    assert all(path.exists() for path in left)
+    (os.killpg if to_all else os.kill)(process.pid, signal.SIGTERM)
+    assert process.wait(20.0) == 143
+    assert list((tmp_path / "tmp").iterdir()) == [] and not (tmp_path / "out").exists()
 
 
 def test_what_a_killed_command_left_is_swept_by_the_next(started, tmp_path, monkeypatch):

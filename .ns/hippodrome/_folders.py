@@ -68,7 +68,8 @@ def unfinished_folder(out: Path) -> Iterator[Path]:
 def written_by_one(out: Path) -> Iterator[None]:
     """Within the block no other command writes in the folder ``out``, which is made if it is not there.
 
-    What killed commands have left unfinished below it is taken away. A folder that was made here and stays empty is, too.
+    What killed commands have left unfinished below it is taken away before, and what this one's processes have left after an
+    error. A folder that was made here and stays empty is, too.
 
     Raises:
         HippodromeError: Another command writes there, or the folder cannot be made.
@@ -79,12 +80,14 @@ def written_by_one(out: Path) -> Iterator[None]:
         handle = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
     except (OSError, ValueError) as error:
         raise HippodromeError(f"{out}: no folder can be made there: {getattr(error, 'strerror', None) or error}") from error
+    locked = False
     try:
-        if _lock(handle, out):
-            for abandoned in filter(OURS.match, map(str, out.rglob(f".*{PART}"))):
-                with suppress(OSError):
-                    _remove_unheld(Path(abandoned))
+        locked = _lock(handle, out)
+        _sweep_below(out, locked)
         yield
+    except BaseException:
+        _sweep_below(out, locked)
+        raise
     finally:
         os.close(handle)
         if new:
@@ -104,6 +107,13 @@ def lock_or_none(handle: int) -> bool | None:
 def sweep_files(folder: Path, name: str) -> None:
     """Take away the unfinished files for ``name`` in ``folder`` that nobody is writing any more."""
     _sweep(folder, f".{name}.", PART)
+
+
+def _sweep_below(out: Path, locked: bool) -> None:
+    """Remove what is unfinished in a folder and those in it, if that is ``locked``: nobody else writes there."""
+    for abandoned in filter(OURS.match, map(str, out.rglob(f".*{PART}") if locked else ())):
+        with suppress(OSError):
+            _remove_unheld(Path(abandoned))
 
 
 def _lock(handle: int, out: Path) -> bool:

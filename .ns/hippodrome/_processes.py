@@ -71,15 +71,26 @@ def ending_like_an_interrupt() -> Iterator[None]:
     """Within the block the signals of ``ENDING`` raise ``Terminated``; a second one ends the process as it always did.
 
     SIGINT raises ``KeyboardInterrupt``, as Python has it. Signals that are ignored, as ``nohup`` asks for, stay so. Only
-    the main thread can have it otherwise.
+    the main thread can have it otherwise. The exception may come up in the middle of a library that makes another one of it,
+    as ctypes does of what comes up while it looks at arguments: after a signal whatever leaves the block is the signal's.
     """
-    kept = {}
+    came, kept = list[KeyboardInterrupt](), {}
+
+    def raise_once(number: int, _frame: FrameType | None) -> NoReturn:
+        signal.signal(number, signal.SIG_DFL)
+        came.append(KeyboardInterrupt() if number == signal.SIGINT else Terminated(number))
+        raise came[0]
+
     with suppress(ValueError):  # not the main thread
         for number in (*ENDING, signal.SIGINT):
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
-                kept[number] = signal.signal(number, _raise_once)
+                kept[number] = signal.signal(number, raise_once)
     try:
         yield
+    except Exception as error:
+        if came:
+            raise came[0] from error
+        raise
     finally:
         for number, handler in kept.items():
             signal.signal(number, handler)
@@ -96,8 +107,7 @@ def end_children(grace_s: float = GRACE_S) -> None:
         waiting = [child for child in waiting if child.sentinel not in gone]
     for child in waiting:
         child.kill()
-
-
-def _raise_once(number: int, _frame: FrameType | None) -> NoReturn:
-    signal.signal(number, signal.SIG_DFL)
-    raise KeyboardInterrupt if number == signal.SIGINT else Terminated(number)
+    for child in children:  # its sentinel goes a moment before its locks do
+        if child.pid is not None and hasattr(os, "waitid"):
+            with suppress(ChildProcessError):
+                os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)

@@ -84,17 +84,18 @@ def build_lane_graph(network: RoadNetwork, reach_limit_m: float, bin_m: float = 
     """
     bins = cut_lanes(network, bin_m)
     lanes = _Lanes(network.lane_lengths_m(), network.successor, network.successor_start, network.left_lane, network.right_lane)
-    table = _reach_table(_Bins(bins.lane, bins.position_m, bins.lane_start), lanes, float(reach_limit_m))
+    own = _Bins(bins.lane, bins.position_m, bins.lane_start)
+    start, reach_bin, reach_m, reach_changes = _reach_table(own, lanes, float(reach_limit_m))
     return LaneGraph(
         lane=bins.lane,
         position_m=bins.position_m,
         points_m=bins.points_m,
         heading_rad=bins.heading_rad,
         lane_start=bins.lane_start,
-        reach_start=table.start,
-        reach_bin=table.ahead.bin,
-        reach_m=table.ahead.distance_m,
-        reach_changes=table.ahead.lane_changes,
+        reach_start=start,
+        reach_bin=reach_bin,
+        reach_m=reach_m,
+        reach_changes=reach_changes,
         reach_limit_m=reach_limit_m,
     )
 
@@ -181,13 +182,6 @@ class _Ahead(NamedTuple):
     lane_changes: UInt8Array
 
 
-class _ReachTable(NamedTuple):
-    """What lies ahead of bin ``i``: rows ``start[i]:start[i + 1]`` of ``ahead``, the nearest first."""
-
-    start: NDArray[np.int64]
-    ahead: _Ahead
-
-
 @njit(cache=True)
 def _push(open_: OpenLanes, size: int, lane: int, begin_m: float, lane_changes: int) -> int:
     """Put a lane on the stack and return the stack's new size; on a full stack the lane is left out."""
@@ -238,8 +232,13 @@ def _walk_ahead(from_bin: int, bins: _Bins, lanes: _Lanes, limit_m: float, open_
 
 
 @njit(cache=True)
-def _reach_table(bins: _Bins, lanes: _Lanes, limit_m: float) -> _ReachTable:
-    """The bins ahead of every bin: counted first, so that the table has the right size, then written and sorted by distance."""
+def _reach_table(
+    bins: _Bins, lanes: _Lanes, limit_m: float
+) -> tuple[NDArray[np.int64], IntArray, Float32Array, NDArray[np.uint8]]:
+    """The bins ahead of every bin: where each bin's own begin, (N + 1,), and the fields of ``_Ahead``.
+
+    They are counted first, so that the table has the right size, then written and sorted by distance.
+    """
     bin_count = bins.lane.shape[0]
     open_ = np.empty(_MAX_OPEN, _OPEN_LANE)
     start = np.zeros(bin_count + 1, np.int64)
@@ -255,7 +254,7 @@ def _reach_table(bins: _Bins, lanes: _Lanes, limit_m: float) -> _ReachTable:
         _walk_ahead(i, bins, lanes, limit_m, open_, own)
         order = np.argsort(own.distance_m, kind="mergesort")
         own.bin[:], own.distance_m[:], own.lane_changes[:] = own.bin[order], own.distance_m[order], own.lane_changes[order]
-    return _ReachTable(start, table)
+    return start, table.bin, table.distance_m, table.lane_changes
 
 
 @njit(cache=True)

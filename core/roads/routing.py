@@ -41,8 +41,8 @@ def route_table(geometry: RoadGeometry, lanes: IntArray, bound_m: float) -> Rout
     start, onward = _successors(geometry, carriageway, len(length))
     sources = np.zeros(len(length), dtype=np.bool_)
     sources[carriageway[lanes]] = True
-    drives = _bounded_searches(_CarriagewayGraph(length, start, onward), sources, bound_m)
-    return RouteTable(geometry.lane_length_m, carriageway, drives.length_m, drives.start, drives.target, drives.gap_m)
+    drive_start, target, gap_m = _bounded_searches(_CarriagewayGraph(length, start, onward), sources, bound_m)
+    return RouteTable(geometry.lane_length_m, carriageway, length, drive_start, target, gap_m)
 
 
 def carriageways(geometry: RoadGeometry) -> tuple[IntArray, FloatArray]:
@@ -119,8 +119,8 @@ class _Candidates(NamedTuple):
 
 
 @njit(cache=True)
-def _bounded_searches(graph: _CarriagewayGraph, sources: BoolArray, bound_m: float) -> _Drives:
-    """The shortest drives from each carriageway in the mask ``sources`` (C,), targets ascending."""
+def _bounded_searches(graph: _CarriagewayGraph, sources: BoolArray, bound_m: float) -> tuple[IntArray, IntArray, FloatArray]:
+    """The shortest drives from each carriageway in the mask ``sources`` (C,), targets ascending: start, target and gap_m."""
     count = len(graph.length_m)
     gap = np.full(count, np.inf)
     start = np.zeros(count + 1, dtype=np.int32)
@@ -132,7 +132,7 @@ def _bounded_searches(graph: _CarriagewayGraph, sources: BoolArray, bound_m: flo
                 gaps.append(gap[node])
                 gap[node] = np.inf
         start[source + 1] = len(targets)
-    return _Drives(graph.length_m, start, np.array(targets, dtype=np.int32), np.array(gaps, dtype=np.float64))
+    return start, np.array(targets, dtype=np.int32), np.array(gaps, dtype=np.float64)
 
 
 @njit(cache=True)

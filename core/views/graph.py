@@ -137,12 +137,17 @@ def _copied_into(larger: Links, links: Links) -> Links:
     return larger
 
 
-@njit(cache=True)
 def walk_back(links: Links, start: int, reach: float) -> Paths:
     """The paths no longer than ``reach`` that lead to ``start``, at most WALK_LIMIT; the first is ``start`` itself, length 0."""
+    return Paths(*_walk_back(links, start, reach))
+
+
+@njit(cache=True)
+def _walk_back(links: Links, start: int, reach: float) -> tuple[IntArray, FloatArray, FloatArray]:
+    """The compiled part of ``walk_back``; the fields of its result."""
     walk = empty_walk()
     count = walk_back_into(walk, links, start, reach)
-    return Paths(walk.source[:count], walk.length[:count], walk.turn_rad[:count])
+    return walk.source[:count], walk.length[:count], walk.turn_rad[:count]
 
 
 @njit(cache=True)

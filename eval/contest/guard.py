@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from hippodrome._files import write_atomically
 from hippodrome.core.types import HippodromeError
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from hippodrome.eval.methods.materials import Materials
 
 ResultT = TypeVar("ResultT")
-INTERRUPTED: Final = 130  # exit status of a worker that is interrupted, which is no fault of the method
 
 
 class Crashed(Exception):
@@ -32,8 +31,6 @@ def guarded(label: str, function: Callable[[], ResultT], materials: Materials) -
     except (HippodromeError, KeyboardInterrupt):
         raise
     except SystemExit as error:
-        if error.code == INTERRUPTED:
-            raise
         raise MethodError(left_by(error)) from error
     except BaseException as error:
         cause, trace = (error.cause, error.trace) if isinstance(error, Crashed) else crash_of(error)

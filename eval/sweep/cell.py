@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import shutil
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -102,8 +103,7 @@ def run_cell(task: CellTask) -> CellResult:
     folder = task.out / "cells" / task.cell.key
     folder.mkdir(parents=True, exist_ok=True)
     for name in SHARED:
-        if not (folder / name).exists():
-            (folder / name).symlink_to(Path("..", "..", name))
+        _share(folder, name)
     if task.cell.scenario.missions.count is not None:
         with _one_at_a_time:
             driven = drive_here(task.cell.scenario, folder)
@@ -113,6 +113,15 @@ def run_cell(task: CellTask) -> CellResult:
     evidence = folder / task.cell.scenario.name
     samples = {row.method: found for row in result.rows if (found := _samples(row, evidence))}
     return CellResult(parameters=dict(task.cell.parameters), result=result, samples=samples)
+
+
+def _share(folder: Path, name: str) -> None:
+    """Link a folder of the sweep into a cell's. A cell whose folder was deleted while it ran has made one of its own there."""
+    link = folder / name
+    if not link.is_symlink():
+        if link.exists():
+            shutil.rmtree(link)
+        link.symlink_to(Path("..", "..", name))
 
 
 def _require_same_code(code: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -16,7 +15,7 @@ from typing import TypeVar
 from rich.progress import Progress
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.pool import INTERRUPTED, process_pool
+from hippodrome.eval.pool import process_pool
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
@@ -172,8 +171,6 @@ def _guarded(task: Callable[[TaskT], ResultT], item: TaskT) -> ResultT | Failure
     except Exception as error:
         return Failure(_said(error))
     except SystemExit as error:
-        if error.code == INTERRUPTED:  # a signal: handed on, this would end the main process, which nobody told to end
-            os._exit(INTERRUPTED)
         return Failure(f"it left the process with status {error.code}")
 
 

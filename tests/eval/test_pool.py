@@ -11,24 +11,25 @@ import pytest
 
 from hippodrome.core.types import HippodromeError
 from hippodrome.eval.files.progress import read_progress
-from hippodrome.eval.pool import INTERRUPTED, worker_pool
+from hippodrome.eval.pool import worker_pool
 
+INTERRUPTED = 130  # exit status by which a shell knows a process that was interrupted
 SCRIPT = """
 import signal, sys, time
-from hippodrome.eval.pool import INTERRUPTED, perform, worker_pool
+from hippodrome.eval.pool import worker_pool
 if __name__ == "__main__":
     handler, seconds = getattr(signal, sys.argv[1]), float(sys.argv[2])
     signal.signal(signal.SIGINT, handler)
     try:
         with worker_pool(2) as pool:
-            busy = pool.executor.submit(perform, time.sleep, seconds)
+            busy = pool.executor.submit(time.sleep, seconds)
             pool.executor.submit(time.sleep, 0.0).result()
             while not busy.running():
                 time.sleep(0.01)
             print("ready", flush=True)
             pool.run("wait", time.sleep, 4 * [seconds])
     except KeyboardInterrupt:
-        sys.exit(INTERRUPTED)
+        sys.exit(130)
 """
 
 

@@ -115,7 +115,6 @@ def _pass_back(rows: Hypotheses, through: Float32Array, i: int, found: Successor
             through[i] = max(through[i], score + found[c].log_likelihood + (through[at] - rows[at].score_nats))
 
 
-@njit(cache=True, error_model="numpy")
 def alternatives(survivors: Survivors, through: Float32Array, points_m: FloatArray, cell: IntArray) -> Alternatives:
     """Collect the alternatives to the best route: the survivors through which a complete route within the margin passes.
 
@@ -128,6 +127,14 @@ def alternatives(survivors: Survivors, through: Float32Array, points_m: FloatArr
         points_m: (N, 2) centre of each bin.
         cell: (N,) cell that each bin belongs to.
     """
+    return Alternatives(*_alternatives(survivors, through, points_m, cell))
+
+
+@njit(cache=True, error_model="numpy")
+def _alternatives(
+    survivors: Survivors, through: Float32Array, points_m: FloatArray, cell: IntArray
+) -> tuple[NDArray[np.int64], Float32Array, Float32Array, IntArray]:
+    """The compiled part of ``alternatives``; the fields of its result."""
     row_start, rows = survivors.row_start, survivors.hypotheses
     times, count = row_start.shape[0] - 1, 0
     for i in range(rows.shape[0]):
@@ -146,7 +153,7 @@ def alternatives(survivors: Survivors, through: Float32Array, points_m: FloatArr
         else:
             place = survivors.places[-1 - row.bin]
             points[j, 0], points[j, 1] = place.x_m, place.y_m
-    return Alternatives(kept_start, points, values, scale_bin)
+    return kept_start, points, values, scale_bin
 
 
 @njit(cache=True, error_model="numpy")

@@ -49,15 +49,14 @@ def forward(drive: Drive, model: SearchModel, limits: BeamLimits, initial: Hypot
     Returns:
         The survivors of the t <= T samples searched; t < T if a limit was reached or no hypothesis was left.
     """
-    survivors: Survivors = _forward(drive, model, limits, initial, initial_places, empty_states(model))
-    return survivors
+    return Survivors(*_forward(drive, model, limits, initial, initial_places, empty_states(model)))
 
 
 @njit(cache=True, error_model="numpy")
 def _forward(
     drive: Drive, model: SearchModel, limits: BeamLimits, initial: Hypotheses, initial_places: Places, empty: IntArray
-) -> Survivors:
-    """As ``forward``, with the empty table of states."""
+) -> tuple[NDArray[np.int64], Hypotheses, Places, bool]:
+    """As ``forward``, with the empty table of states; the fields of ``Survivors``."""
     samples = drive.heading_rad.shape[0]
     size, place_count = initial.shape[0], initial_places.shape[0]
     rows, places = with_room(initial, size + 1), with_room(initial_places, place_count + 1)
@@ -81,7 +80,7 @@ def _forward(
             died_out = row_start[t + 1] == end
             samples = t if died_out else t + 1
             break
-    return Survivors(row_start[: samples + 1], rows[: row_start[samples]], places[:place_count], died_out)
+    return row_start[: samples + 1], rows[: row_start[samples]], places[:place_count], died_out
 
 
 @njit(cache=True, error_model="numpy")

@@ -78,7 +78,9 @@ def written_by_one(out: Path) -> Iterator[None]:
         out.mkdir(parents=True, exist_ok=True)
         handle = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
     except (OSError, ValueError) as error:
-        raise HippodromeError(f"{out}: no folder can be made there: {getattr(error, 'strerror', None) or error}") from error
+        raise HippodromeError(
+            f"{out}: no folder can be made there: {getattr(error, 'strerror', None) or error}; give another --out"
+        ) from error
     try:
         if _lock(handle, out):
             for abandoned in filter(OURS.match, map(str, out.rglob(f".*{PART}"))):

@@ -98,9 +98,10 @@ class Workers:
         except BrokenProcessPool:
             places = sorted({place(items[future]) for future in begun or futures if not _ended_well(future)} - {""})
             raise HippodromeError(f"{stage}: {_how_it_died(processes, places)}") from None
-        finally:
+        except Exception:  # what a task raised; not an interrupt, nor a death, at which the executor itself lets go of the tasks
             for future in futures:
-                future.cancel()
+                future.cancel()  # the executor's thread stumbles, with a traceback, if a process dies and one is cancelled here
+            raise
 
     def _alive(self) -> list[BaseProcess]:
         """The processes that there are; no public way tells how one of them ended."""

@@ -77,10 +77,15 @@ def _read_file(path: Path) -> bytes:
                 raise PbstreamError(f"{path}: {status.st_size} bytes, the limit is {MAX_FILE_BYTES}")
             magic = file.read(len(MAGIC))
             if magic != MAGIC:
-                raise PbstreamError(f"{path}: byte 0: not a hippodrome map (it begins with {magic!r}, expected {MAGIC!r})")
+                raise PbstreamError(
+                    f"{path}: byte 0: not a hippodrome map (it begins with {magic!r}, expected {MAGIC!r}); "
+                    f"name one that `hippodrome map` or `hippodrome refine` wrote"
+                )
             return magic + file.read(status.st_size)  # never more than was just measured
     except OSError as error:
-        raise PbstreamError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise PbstreamError(
+            f"{path}: cannot be read: {error.strerror or error}; name a map that `hippodrome map` or `hippodrome refine` wrote"
+        ) from error
 
 
 def _open_without_waiting(name: str, flags: int) -> int:

@@ -17,7 +17,7 @@ from typing import Any
 
 import cv2
 
-from hippodrome._files import read_bounded, replacing, sha256_of
+from hippodrome._files import read_bounded, replacing, sha256_of, why_unreadable
 from hippodrome._json import parse_json
 from hippodrome.core.types import Frame, HippodromeError, Observation, Step, Trajectory
 from hippodrome.sim.array_file import read_arrays
@@ -124,7 +124,7 @@ def read_samples(path: Path) -> Samples:
 
 def _said(error: Exception) -> str:
     """An exception in a line; some say nothing but their name."""
-    return " ".join(str(error).split())[:200] or type(error).__name__
+    return why_unreadable(error)[:200]
 
 
 def seal(folder: Path, content: dict[str, Any], samples: Samples) -> Recording:
@@ -147,6 +147,11 @@ def open_recording(folder: Path, verify: bool = True) -> Recording:
     except FileNotFoundError:
         raise RecordingError(
             f"{folder}: not a finished recording (no {MANIFEST}); run `hippodrome render` to finish it"
+        ) from None
+    except NotADirectoryError:
+        raise RecordingError(
+            f"{folder}: a file, or below one, where a recording's folder is wanted; name the folder with {MANIFEST} in it, "
+            f"as `hippodrome render` or `hippodrome import` made it"
         ) from None
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise RecordingError(f"{path}: not a recording's manifest ({_said(error)}); {ANEW}") from None

@@ -40,8 +40,8 @@ def pids_of(process, word, wanted):
 
 
 def gone(process):
-    """Whether nobody of its session is left after a few seconds; who is, is ended."""
-    end_s = time.monotonic() + 5.0
+    """Whether nobody of its session is left after a while, in which a busy machine ends them; who is, is ended."""
+    end_s = time.monotonic() + 30.0
     while (left := session(process.pid)) and time.monotonic() < end_s:
         time.sleep(0.05)
     for pid in left:

@@ -79,7 +79,9 @@ def written_by_one(out: Path) -> Iterator[None]:
         out.mkdir(parents=True, exist_ok=True)
         handle = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
     except (OSError, ValueError) as error:
-        raise HippodromeError(f"{out}: no folder can be made there: {getattr(error, 'strerror', None) or error}") from error
+        raise HippodromeError(
+            f"{out}: no folder can be made there: {getattr(error, 'strerror', None) or error}; give another --out"
+        ) from error
     locked = False
     try:
         locked = _lock(handle, out)

@@ -15,7 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hippodrome._files import replacing
+from hippodrome._files import replacing, why_unreadable
 from hippodrome.core.types import Frame, HippodromeError, Trajectory
 from hippodrome.eval.methods.protocol import StereoObservation
 from hippodrome.sim.episode import Samples
@@ -96,7 +96,9 @@ def read_pair(folder: Path, number: int) -> tuple[Frame, Frame]:
         blobs = [_open(path, path.stat().st_mtime_ns).read(_name(number, side)) for side in "lr"]
         left, right = (cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_GRAYSCALE) for blob in blobs)
     except (OSError, KeyError, zipfile.BadZipFile, cv2.error) as error:
-        raise HippodromeError(f"{path}: pair {number} cannot be read ({error}); delete the file to draw it anew") from None
+        raise HippodromeError(
+            f"{path}: pair {number} cannot be read ({why_unreadable(error)}); delete the file to draw it anew"
+        ) from None
     if left is None or right is None:
         raise HippodromeError(f"{path}: pair {number} is no image; delete the file to draw it anew")
     return np.asarray(left, dtype=np.uint8), np.asarray(right, dtype=np.uint8)

@@ -155,3 +155,26 @@ def test_options_take_no_numbers_that_are_none(arguments, capsys):
     with pytest.raises(SystemExit) as caught:
         main(arguments)
     assert caught.value.code == 2 and "error: argument" in capsys.readouterr().err
+
+
+WANTED = {  # what each command takes where {} stands, by the word before it
+    "a recording": ["map {} --out o", "score f.tum {}", "export {} --to evo --out o", "import {} --out o"],
+    "a map": ["refine {} --network n --out o", "localize {} d --out o", "import {} --from odometry --out o"],
+    "results": ["report {}", "compare {} d", "compare f.tum {}", "board {} --out o", "gate s.yaml --baseline {} --out o"],
+    "a scenario": ["scenario validate {}", "scenario preview {} --out o", "stress {} --out o", "drive {} --out o"],
+    "a network": ["scenario new x --from {} --out o.yaml", "run d --network {} --out o"],
+    "a folder to write in": ["eval towns/grid --out {}", "serve {} --port 0"],
+}
+
+
+@pytest.mark.parametrize("line", [line for lines in WANTED.values() for line in lines])
+def test_a_file_for_a_folder_a_folder_for_a_file_and_nothing_at_all_are_refused_in_words(tmp_path, monkeypatch, capsys, line):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "d" / "manifest.json").mkdir(parents=True)
+    (tmp_path / "f.tum").write_text("0 0 0 0 0 0 0 1\n")
+    (tmp_path / "empty").touch()
+    writes = line.startswith(("eval", "serve"))  # there a folder, or one that is still to come, is what is wanted
+    for given in ("f.tum", "empty", *(() if writes else ("f.tum/below", "d", "missing"))):
+        assert main(line.format(given).split()) == 2
+        said = capsys.readouterr().err.strip()
+        assert "Errno" not in said and "\n" not in said and ";" in said, said

@@ -6,12 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
 
 import pytest
 
 from hippodrome.core.types import HippodromeError
-from hippodrome.eval.files.progress import read_progress
-from hippodrome.eval.pool import worker_pool
+from hippodrome.eval.files.progress import Teller, read_progress
+from hippodrome.eval.pool import Workers, progress_bar, worker_pool
 
 INTERRUPTED = 130  # exit status by which a shell knows a process that was interrupted
 SCRIPT = """
@@ -64,6 +65,24 @@ def test_a_worker_that_dies_between_two_stages_is_told_by_the_next():
         while not getattr(pool.executor, "_broken", True):
             time.sleep(0.01)
         pool.run("weigh", abs, ["a"], place=lambda item: f"net {item}")
+
+
+@pytest.mark.parametrize(("ended_by", "cancelled"), [(KeyboardInterrupt, False), (HippodromeError, True)])
+def test_at_an_interrupt_the_executor_alone_lets_go_of_its_tasks(ended_by, cancelled):
+    """Its thread fails with a traceback if it finds a process dead, as after a signal to all, and a task cancelled here."""
+    left = [Future(), Future()]
+    left[0].set_result(None)
+    given = iter(left)
+
+    class Executor:
+        submit = staticmethod(lambda *_: next(given))
+
+    def end(_):
+        raise ended_by
+
+    with progress_bar() as progress, pytest.raises(ended_by):
+        Workers(Executor(), progress, 1, Teller(False)).run("wait", abs, [1, 2], follow=end)
+    assert left[1].cancelled() == cancelled
 
 
 def _pid(_):

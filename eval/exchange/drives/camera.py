@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import ValidationError
 
+from hippodrome._files import why_unreadable
 from hippodrome.core.types import FloatArray
 from hippodrome.sim.key_words import first_fault
 from hippodrome.sim.recording import CHUNK_FRAMES, MANIFEST, Recording, RecordingError, chunk_path, frame_name
@@ -78,4 +79,6 @@ def pictures(recording: Recording) -> Iterator[Picture]:
                     right = archive.read(frame_name(number, "r")) if frame_name(number, "r") in names else None
                     yield Picture(float(t_s[number]), number, archive.read(frame_name(number)), right)
         except (OSError, KeyError, zipfile.BadZipFile) as error:
-            raise RecordingError(f"{path}: frames cannot be read ({error}); delete the recording to make it anew") from None
+            raise RecordingError(
+                f"{path}: frames cannot be read ({why_unreadable(error)}); delete the recording to make it anew"
+            ) from None

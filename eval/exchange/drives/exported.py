@@ -178,4 +178,6 @@ def _folders(folder: Path) -> list[Path]:
     try:
         return [path for path in folder.iterdir() if path.is_dir()]
     except OSError as error:
-        raise ExchangeError(f"{folder}: cannot be read: {error.strerror}") from None
+        raise ExchangeError(
+            f"{folder}: cannot be read: {error.strerror}; name the folder of a recording, or DIR of `hippodrome eval`"
+        ) from None

@@ -120,7 +120,9 @@ def motion_of(trajectory: Trajectory, name: str) -> Motion:
     It drives backwards if the second pose lies behind the first. Raises ExchangeError if there are fewer than three poses.
     """
     if len(trajectory.t_s) < 3:
-        raise ExchangeError(f"{name}: {len(trajectory.t_s)} pose(s), at least 3 are needed to tell self-motion")
+        raise ExchangeError(
+            f"{name}: {len(trajectory.t_s)} pose(s), at least 3 are needed to tell self-motion; give the whole drive"
+        )
     dt_s = np.diff(trajectory.t_s)
     steps = se2.between(trajectory.poses[:-1], trajectory.poses[1:])
     half_turn = steps[:, 2] / 2.0

@@ -59,7 +59,7 @@ def _oxts(folder: Path) -> tuple[Motion, FloatArray]:
     if (lost := len(t_s) - len(kept)) > 0:
         print(f"{folder}: {lost} of {len(t_s)} packets are missing or repeat a time and are left out")
     if len(rows) < 3:
-        raise ExchangeError(f"{folder}: {len(rows)} packet(s), at least 3 are needed to tell self-motion")
+        raise ExchangeError(f"{folder}: {len(rows)} packet(s), at least 3 are needed to tell self-motion; give the whole drive")
     table, times_s = np.array(rows), t_s[kept]
     if not np.isfinite(table).all():
         raise ExchangeError(f"{folder}: packet {kept[int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0])]} is not finite")

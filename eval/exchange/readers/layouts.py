@@ -56,7 +56,7 @@ LAYOUTS: Final = (
 def recognised(source: Path) -> str:
     """The name of the layout that ``source`` has. Raises ExchangeError, which lists the layouts, if it is none of them."""
     if not source.exists():
-        raise ExchangeError(f"{source}: no such file or folder")
+        raise ExchangeError(f"{source}: no such file or folder; check the path")
     found = next((layout.name for layout in LAYOUTS if layout.fits(source)), None)
     if found is None:
         raise ExchangeError(f"{source}: no layout is recognised; there are: {described()}; --from says which one is meant")

@@ -43,7 +43,7 @@ def read_table(path: Path, columns: int, separator: str | None = None, exactly: 
             found = no_number(first_that_is_none(words[:columns]), number == 1)
             raise ExchangeError(f"{path}: line {number}: not a number in '{line.strip()[:60]}': {found}") from None
     if not rows:
-        raise ExchangeError(f"{path}: no data")
+        raise ExchangeError(f"{path}: no data; give a file with a row for each time")
     table = np.array(rows)
     if not np.isfinite(table).all():
         raise ExchangeError(f"{path}: data row {int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0]) + 1} is not finite")

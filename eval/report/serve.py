@@ -42,8 +42,9 @@ def make_server(folder: Path, port: int) -> http.server.ThreadingHTTPServer:
     class Handler(_Handler):
         root = folder
 
-    if folder.exists() and not folder.is_dir():
-        raise ServeError(f"{folder}: is a file; give the folder of a run, as its --out has it")
+    for place in (folder, *folder.parents):
+        if place.exists() and not place.is_dir():
+            raise ServeError(f"{place}: is a file; give the folder of a run, as its --out has it")
 
     try:
         return http.server.ThreadingHTTPServer((ADDRESS, port), Handler)

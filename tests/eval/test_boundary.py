@@ -174,7 +174,7 @@ def test_a_file_for_a_folder_a_folder_for_a_file_and_nothing_at_all_are_refused_
     (tmp_path / "f.tum").write_text("0 0 0 0 0 0 0 1\n")
     (tmp_path / "empty").touch()
     writes = line.startswith(("eval", "serve"))  # there a folder, or one that is still to come, is what is wanted
-    for given in ("f.tum", "empty", *(() if writes else ("f.tum/below", "d", "missing"))):
+    for given in ("f.tum", "empty", "f.tum/below", *(() if writes else ("d", "missing"))):
         assert main(line.format(given).split()) == 2
         said = capsys.readouterr().err.strip()
         assert "Errno" not in said and "\n" not in said and ";" in said, said

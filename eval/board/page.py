@@ -33,6 +33,11 @@ for (const table of document.querySelectorAll('table')) {
     }).forEach(row => body.append(row));
   }));
 }
+for (const box of document.querySelectorAll('.scroll')) {
+  const look = () => box.classList.toggle('more', box.scrollLeft + box.clientWidth < box.scrollWidth - 1);
+  box.addEventListener('scroll', look, { passive: true });
+  new ResizeObserver(look).observe(box);
+}
 """
 SEVERAL: Final = (
     " Columns of one scenario's name are of different drives, as something was set otherwise; the letters behind the name are "
@@ -144,10 +149,15 @@ def _summary(cell: Cell) -> Html:
     """Mean, and the lowest and highest of several values; how many failed or were refused."""
     parts: list[str] = []
     if cell.values:
-        parts.append(f"{np.mean(cell.values):.2f}")
+        parts.append(_figure(float(np.mean(cell.values))))
     if len(cell.values) > 1:
-        least, most = f"{min(cell.values):.2f}", f"{max(cell.values):.2f}"
+        least, most = _figure(min(cell.values)), _figure(max(cell.values))
         parts.append(f"({len(cell.values)} runs)" if least == most else f"({least} to {most}, {len(cell.values)} runs)")
     parts += [f"{len(cell.failures)} FAILED"] if cell.failures else []
     parts += [f"{len(cell.refusals)} REFUSED"] if cell.refusals else []
     return joined(" ".join(parts))
+
+
+def _figure(value: float) -> str:
+    """Two digits after the point; of less than a hundredth the first digit, as it is not nothing."""
+    return f"{value:.2f}" if value == 0.0 or abs(value) >= 0.01 else f"{value:.1g}"

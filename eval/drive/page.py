@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +27,10 @@ COLOURS: Final = ("#1769aa", "#b3432b", "#2e7d4f", "#7a4fa3", "#a8741a", "#0f7c8
 EVERY: Final = 5  # a point of the trace in half a second
 MARGIN_M: Final = 15.0
 CAR_SHARE: Final = 0.03  # length of the car that plays, as a share of the town's width: one in scale could not be seen
+ABOUT: Final = (
+    "In each mission a vehicle drives by itself, among traffic, from a hidden start to a goal on the map that it made. Each row "
+    "is another driver: ours, ours with its true pose or less to go by, or one of somebody else."
+)
 LEGEND: Final = (
     "These are the ways that one row drove, with a colour for each mission. A way leads from the small dot to the large one, and "
     "is dashed until the vehicle knew where it was. The arrow is the vehicle; the circle is where it believed to be."
@@ -38,7 +43,8 @@ STYLE: Final = """
 .roads-map .car { fill: var(--ink); } .roads-map .belief { fill: none; stroke: var(--ink); stroke-width: 1; }
 @media (prefers-color-scheme: dark) { .roads-map .ways { filter: brightness(1.7); } }
 main > section:first-child { margin-top: 1rem; }
-.words { margin-top: 1rem; } .words td { white-space: normal; min-width: 8em; } .words td:nth-child(9) { min-width: 16em; }
+.words { margin-top: 1rem; } .words td { white-space: normal; min-width: 4em; }
+.words td:is(:nth-child(4), :nth-child(5), :nth-child(6)) { min-width: 8em; } .words td:nth-child(9) { min-width: 12em; }
 .words td, .words thead th { text-align: left; }
 .drive-controls { display: flex; flex-wrap: wrap; gap: .5rem 1rem; align-items: center; margin: .5rem 0; }
 .drive-controls input { flex: 1 1 12rem; min-width: 0; }
@@ -54,6 +60,7 @@ def write_page(results: Results, tasks: Sequence[MissionTask], out: Path) -> Non
     figures = element("section", mission_overview(results), definitions(first))
     body = [
         element("header", element("h1", "Missions")),
+        element("p", ABOUT, class_="lede"),
         element("main", figures, *towns),
         element("footer", "Made by ", element("code", "hippodrome drive"), ". The same figures lie in results.json."),
     ]
@@ -80,7 +87,18 @@ def _town(result: ScenarioResult, tasks: Sequence[MissionTask]) -> Html:
         for row in result.rows
         for one in (drive_of(row) or {}).get("missions_detail", ())
     ]
-    heads = ("Row and mission", "Reached", "Why it ended", "Start", "Goal", "End", "Driven (m)", "Time (s)", "Events", "Play")
+    heads = (
+        "Row and mission",
+        "Reached",
+        "Why it ended",
+        "Start (lane, way along it)",
+        "Goal (lane, way along it)",
+        "End",
+        "Driven (m)",
+        "Time (s)",
+        "Events",
+        "Play",
+    )
     failed = [element("li", f"{row.method} failed: {row.failure}") for row in result.rows if row.failure is not None]
     text = json.dumps(played, allow_nan=False).replace("<", "\\u003c")
     return element(
@@ -118,8 +136,14 @@ def _mission(method: str, one: dict[str, Any], place: int | None) -> list[Child]
     label = f"{method}, {one['number']}"
     play = element("button", "\u25b6", type="button", class_="show", data_mission=place, aria_label=f"Play {label}")
     reached = element("span", "yes", class_="good") if one["success"] else element("span", "no", class_="bad")
-    return [label, reached, one["cause"], one["start"], one["goal"], one["end"], f"{one['driven_m']:.0f}", f"{one['time_s']:.0f}",
-            events, play if place is not None else "-"]  # fmt: skip
+    places = [_whole(one[name]) for name in ("start", "goal", "end")]
+    figures = [f"{one['driven_m']:.0f}", f"{one['time_s']:.0f}"]
+    return [label, reached, one["cause"], *places, *figures, events, play if place is not None else "-"]
+
+
+def _whole(place: str) -> str:
+    """A place in words, its metres not apart from their unit."""
+    return re.sub(r"(?<=\d) m\b", "\N{NO-BREAK SPACE}m", place)
 
 
 def _map(name: str, network: RoadNetwork, ways: Sequence[Html]) -> Html:

@@ -143,7 +143,7 @@ def _interval(change: Change) -> str:
 
 def _percent(ratio: float) -> str:
     """A ratio as a change in per cent or, where it is many times over, as a factor."""
-    return f"{100.0 * (ratio - 1.0):+.1f} %" if ratio < 10.0 else f"x {ratio:.3g}"
+    return f"{100.0 * (ratio - 1.0):+z.1f} %" if ratio < 10.0 else f"x {ratio:.3g}"  # z: no minus before zero
 
 
 def _xml(text: str) -> str:

@@ -142,7 +142,10 @@ def _worst_moment(town: str, belief: Belief | None) -> Html | None:
 def town_caveats(scenario: ScenarioResult, files: ScenarioFiles) -> Html | None:
     """The caveats of one town, in its tab; None if there are none."""
     lines = [f"Not vouched for: {line}" for line in unvouched_lines(scenario, files) or ()]
-    lines += [f"In doubt after the first fix: {line}" for line in doubt_lines(scenario, files) or ()]
+    lines += [
+        f"In doubt after the first fix (it said that it no longer knew its place): {line}"
+        for line in doubt_lines(scenario, files) or ()
+    ]
     wrong = [line for line in false_fix_lines([scenario], [files]) if not line.endswith(": none.")]
     items = [element("li", line) for line in (*lines, *(joined("False fixes: ", line) for line in wrong))]
     return element("ul", items, class_="caveats") if items else None

@@ -41,12 +41,14 @@ def _caveats(results: Results, found: Sequence[ScenarioFiles]) -> Iterator[tuple
     """What the means do not say; None for a question that does not arise."""
     pairs = list(zip(results.scenarios, found, strict=True))
     yield "Limits", _listed(limit_lines(results.scenarios), "None: the scenarios set none.")
-    for name, lines_of, nothing in (
-        ("Not vouched for", unvouched_lines, "Nothing: the road match vouches for every vertex of the refined maps."),
-        ("In doubt again", doubt_lines, "Never: once localized, it stayed so until the end of the drive."),
-    ):
+    for name, lines_of, meaning, nothing in (
+        ("Not vouched for", unvouched_lines, "", "Nothing: the road match vouches for every vertex of the refined maps."),
+        ("In doubt again", doubt_lines, "When a localizer said, after its first fix, that it no longer knew its place:",
+         "Never: once localized, it stayed so until the end of the drive."),
+    ):  # fmt: skip
         known = [(one.name, lines) for one, files in pairs if (lines := lines_of(one, files)) is not None]
-        yield name, _listed([f"{town}, {line}" for town, lines in known for line in lines], nothing) if known else None
+        lines = [f"{town}, {line}" for town, lines in known for line in lines]
+        yield name, joined(meaning if lines else "", _listed(lines, nothing)) if known else None
     counted = false_fix_lines(results.scenarios, found)
     meaning = f"How often a localizer was sure of a place more than {FALSE_FIX_M:g}{NBSP}m away from the truth:"
     yield "False fixes", joined(meaning, _listed(counted, "")) if counted else None
@@ -90,8 +92,8 @@ def _best(results: Results, best: str | None) -> Html:
     count = len(results.scenarios)
     where = "in the one town" if count == 1 else f"in {wins} of {count} towns"
     meaning = (
-        "APE (absolute position error) is how far a map puts the car from its true place, in the mean over the vertices that the "
-        "first drive left."
+        "APE (absolute position error) is how far a map puts the car from its true place, in the mean over the map's vertices: "
+        "the places that it keeps of the first drive."
     )
     return joined(element("strong", best), f" has the smallest mean APE {where}, {spread}. {meaning}")
 

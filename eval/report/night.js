@@ -66,6 +66,7 @@ async function drawForNight(figure) {
   await night.decode();
   night.alt = day.alt;
   night.className = "night";
+  if (figure.classList.contains("flat")) night.style.width = `${night.width}px`; // as wide as the other, whose pixels are more
   day.after(night);
 }
 

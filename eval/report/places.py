@@ -14,6 +14,10 @@ from hippodrome.eval.report.files import ScenarioFiles
 from hippodrome.eval.report.markup import Html, element, joined
 from hippodrome.eval.report.why import WITHIN_95, Place
 
+SCORES: Final = (
+    "A score says by how many standard deviations a stored view resembles the frame more than all stored views do in the mean; "
+    "evidence adds up the scores of views in a row, along the streets."
+)
 FRAME_LABEL: Final = "camera frame at {:.1f} s"
 NBSP: Final = "\N{NO-BREAK SPACE}"
 
@@ -41,7 +45,7 @@ def localization_places(files: ScenarioFiles, town: str) -> Html | None:
         for belief in reversed(files.second.beliefs)
         if (cards := [_step(belief, step, files.second.frames, files.evidence, town, files) for step in worst_steps(belief)])
     ]
-    return joined(groups) if groups else None
+    return joined(element("p", SCORES, class_="note"), *groups) if groups else None
 
 
 def _vertex(layer: Layer, vertex: int, evidence: MapEvidence, place: Place | None, town: str, files: ScenarioFiles) -> Html:

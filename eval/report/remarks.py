@@ -52,7 +52,12 @@ def lede(results: Results) -> Html:
     km = sum(one.network.km for one in results.scenarios)
     drive_s = sum(one.duration_s for one in results.scenarios)
     driven = [coverage * one.network.km for one in results.scenarios if (coverage := _coverage(one)) is not None]
-    road = f"{sum(driven):.1f} of {km:.1f} km of road" if len(driven) == len(results.scenarios) else f"in {km:.1f} km of road"
+    on_all = len(driven) == len(results.scenarios)
+    road = (
+        f"on {sum(driven):.1f} of the {km:.1f}\N{NO-BREAK SPACE}km of road"
+        if on_all
+        else f"in {km:.1f}\N{NO-BREAK SPACE}km of road"
+    )
     return joined(
         f"In each town a simulated car drives twice. The first drives ({drive_s / 60:.0f} minutes, {road}) are mapped from "
         "camera and wheels; the second ones are localized in those maps, from an unknown start."

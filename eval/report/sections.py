@@ -185,7 +185,7 @@ def _tile(row: Row, colours: Mapping[str, str]) -> Html:
 def _undrawn(scenario: ScenarioResult, colours: Mapping[str, str]) -> Html | None:
     """Which methods have no colour, as maps do not show them; None if they show all, or there is no map."""
     names = [row.method for row in reversed(scenario.rows) if row.ape is not None and row.method not in colours]
-    words = f"A ring without a colour: maps and figures do not show {'; '.join(names)}."
+    words = f"A ring without a colour: maps and figures do not show {'; '.join(names)}, which would cover another map."
     return element("p", words, class_="note") if names and colours else None
 
 
@@ -210,7 +210,12 @@ def _interactive_map(files: ScenarioFiles) -> Html:
         element("small", "Vertices coloured by APE have a rim in their method's colour where several maps are shown."),
         element("label", "Vertex ", element("input", type="range", min=0, value=0, class_="scrub")),
         element("div", class_="tile", role="img", hidden=True) if files.thumbnails else None,
-        element("p", "Hover over a vertex, click to keep it and see its camera frame.", class_="vertex", aria_live="polite"),
+        element(
+            "p",
+            "Point at a vertex to see its error; click or tap it to keep it and see its camera frame.",
+            class_="vertex",
+            aria_live="polite",
+        ),
         class_="side",
     )
     missing = element("noscript", "The interactive map needs JavaScript; the figures below show the same maps.")

@@ -22,6 +22,7 @@ from hippodrome.eval.results.tables import (
 
 FIRST: Final = ("APE (m)", "Success", "Error (m)")  # columns beside the method's name, so that a phone shows them unscrolled
 NBSP: Final = "\N{NO-BREAK SPACE}"
+KEYED: Final = 4  # columns beyond which a table is wide: on a phone, both names of a row stay in sight if one tells too little
 LONG: Final = 36  # letters of a name from which on it is broken
 SPLIT: Final = {  # headings of cells that hold several figures, and those of one column for each figure
     "APE median / p95 / max": ("APE median (m)", "APE p95 (m)", "APE max (m)"),
@@ -48,7 +49,9 @@ def plain_table(heads: Sequence[str], rows: Sequence[Sequence[Child]], label: st
         element("tr", row_head(row[0]), [element("td", cell, class_=kind) for cell, kind in zip(row[1:], kinds[1:], strict=True)])
         for row in rows
     ]
-    return scrolling(element("table", element("thead", head), element("tbody", body)), label)
+    is_keyed = len(heads) > KEYED and kinds[1] is not None and len({joined(row[0]) for row in rows}) < len(rows)
+    table = element("table", element("thead", head), element("tbody", body), class_="keyed" if is_keyed else None)
+    return scrolling(table, label)
 
 
 def _is_words(cells: Sequence[Child]) -> bool:
@@ -235,4 +238,4 @@ def _best_marked(cells: Sequence[Child]) -> list[Child]:
 
 
 def _paper_line(quoted: Sequence[Row]) -> str:
-    return "; ".join(f"{row.method} {QUOTED_MARK} {row.ape.mean_m:g} m" for row in quoted if row.ape is not None)
+    return "; ".join(f"{row.method} {QUOTED_MARK} {row.ape.mean_m:g}\N{NO-BREAK SPACE}m" for row in quoted if row.ape is not None)

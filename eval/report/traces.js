@@ -1,8 +1,8 @@
 // How sure both populations of both networks were along the second drive (reliability, 1/sigma²), and when views were injected.
 
-const TRACE_ROWS = [["head_reliability", "head direction"], ["grid_reliability", "grid cells"]];
+const TRACE_ROWS = [["head_reliability", "head direction", "heading"], ["grid_reliability", "grid cells", "a period's 360°"]];
 const RISE = 1.02; // between injections reliabilities only fall: a calibration population that is surer than before was injected into
-const WIDE_PX = 480, LEGEND_PX = 760; // from these widths on there is room for all words, and for the names of the lines
+const LEGEND_PX = 760, LEGEND_ROOM_PX = 190; // width from which on there is room for the names of the lines, and theirs
 const POPULATION_NAMES = ["integrator", "calibration"]; // in the order of POPULATIONS
 const TRACE_LEFT = 8, TRACE_HEAD = 18;
 
@@ -37,18 +37,20 @@ function makeTraces(canvas) {
     const tall = size.h / TRACE_ROWS.length;
     on.setTransform(size.ratio, 0, 0, size.ratio, 0, 0);
     on.font = "12px system-ui, sans-serif";
-    TRACE_ROWS.forEach(([key, name], row) => drawRow(on, key, name, row * tall, tall));
+    TRACE_ROWS.forEach(([key, name, turn], row) => drawRow(on, key, name, turn, row * tall, tall));
   }
 
-  function drawRow(on, key, name, top, tall) {
+  function drawRow(on, key, name, turn, top, tall) {
     const series = [0, 1].map((population) => drawn[key].map((values) => Math.log10(Math.max(sureness(values, population), 1e-4))));
     const all = series.flat(), low = all.reduce((a, b) => Math.min(a, b)), high = all.reduce((a, b) => Math.max(a, b));
     const Y = (value) => top + tall - 6 - ((value - low) / Math.max(high - low, 1e-9)) * (tall - TRACE_HEAD - 10);
     const marks = injections(drawn);
     on.fillStyle = inks.soft;
     const over = top === 0 ? `; from left to right: the second drive, ${Math.round(drawn.t_s.at(-1) - drawn.t_s[0])} s` : "";
-    const range = `${sigma(10 ** low)} to ${sigma(10 ** high)}`, wide = `${name}: certainty from ${range}, on a log scale; ticks: the ${marks.length} injections${over}`;
-    on.fillText(size.w < WIDE_PX ? `${name}: ${range}, ${marks.length} injections` : wide, TRACE_LEFT + 5, top + 12);
+    const range = `${sigma(10 ** low)} to ${sigma(10 ** high)}`, wide = `${name}: certainty, from ${range} of ${turn}, on a log scale; ticks: the ${marks.length} injections`;
+    const room = size.w - 2 * TRACE_LEFT - (top === 0 && size.w >= LEGEND_PX ? LEGEND_ROOM_PX : 0);
+    const words = [wide + over, wide, `${name}: ${range}; ticks: the ${marks.length} injections`, `${name}: ${range}, ${marks.length} injections`];
+    on.fillText(words.find((one) => on.measureText(one).width < room) ?? words.at(-1), TRACE_LEFT + 5, top + 12);
     if (size.w >= LEGEND_PX && top === 0) drawLegend(on);
     on.fillStyle = inks.accent;
     for (const i of marks) on.fillRect(X(drawn.t_s[i]), top + TRACE_HEAD, 1, 5);
@@ -74,7 +76,7 @@ function makeTraces(canvas) {
     });
   }
 
-  const sigma = (reliability) => { const degrees = 180 / Math.PI / Math.sqrt(reliability); return degrees > 90 ? "flat" : `${degrees.toPrecision(2)}° of phase`; };
+  const sigma = (reliability) => { const degrees = 180 / Math.PI / Math.sqrt(reliability); return degrees > 90 ? "none" : `±${degrees.toPrecision(2)}°`; };
 
   return {
     forget() { size = null; },

@@ -19,7 +19,7 @@ from hippodrome.eval.results.model import Row
 
 OURS: Final = "hippodrome"  # source of the methods that come with us
 CAMERA: Final = "frames of one small camera, self-motion"
-HEAD: Final = ("Method", "Is given", "Frame of its APE", "What favours or burdens it")
+HEAD: Final = ("Method", "Is given", "How its map is laid on the truth", "What favours or burdens it")
 
 # By the label of the method, or of the system that it is a variant of: both trajectories of ORB-SLAM3 have one entry.
 GIVEN: Final[dict[str, tuple[str, str, str]]] = {

@@ -45,9 +45,9 @@ def _in_words(limits: Thresholds) -> str:
     asked = [
         f"{name} at most {limit:g}{unit}"
         for name, limit, unit in (
-            ("mean APE", limits.ape_mean_m, " m"),
-            ("mean RPE", limits.rpe_mean_m, " m"),
-            ("mean localization error", limits.localization_error_mean_m, " m"),
+            ("mean APE", limits.ape_mean_m, "\N{NO-BREAK SPACE}m"),
+            ("mean RPE", limits.rpe_mean_m, "\N{NO-BREAK SPACE}m"),
+            ("mean localization error", limits.localization_error_mean_m, "\N{NO-BREAK SPACE}m"),
             ("false fixes", limits.false_fixes, ""),
         )
         if limit is not None

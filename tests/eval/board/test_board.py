@@ -39,6 +39,12 @@ def test_seeds_of_one_drive_are_one_cell_with_its_spread(folder):
     assert "2.00 (1.00 to 3.00, 2 runs)" in page
 
 
+def test_a_figure_that_is_small_is_not_nothing(folder):
+    one = folder("a", scenario([Row(method="mine", cpu_percent=0.0031), Row(method="none", cpu_percent=0.0)]))
+    page = write_board([one], one / "board.html").read_text()
+    assert ">0.003<" in page and ">0.00<" in page
+
+
 def test_other_definitions_and_other_drives_of_one_name_are_told_apart(folder):
     rows = [Row(method="mine", ape=ape(1.0))]
     one, other = scenario(rows), scenario(rows, camera={"width": 80})

@@ -40,6 +40,7 @@ def test_figures_causes_and_definitions_are_in_the_page(page):
     text = page.read_text(encoding="utf-8")
     assert "2 x wrong way" in text and "right of way 0.33" in text and "share that stood within 3 m" in text
     assert HOSTILE not in text and text.count('class="way lost"') == 2 and "ours, pose from truth, mission 0" in text
+    assert "a_0 20.0\N{NO-BREAK SPACE}m" in text and "from a hidden start to a goal" in text
 
 
 @pytest.mark.parametrize(("width", "dark"), [(1400, False), (360, True)])

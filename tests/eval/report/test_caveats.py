@@ -30,7 +30,7 @@ def test_limits_are_said_in_words_with_the_towns_in_which_they_hold():
         scenario(name, configuration=limits, rows=(row("x", ape_m, localization=sure),))
         for name, ape_m in (("a", 1.0), ("b", 3.0))
     ]
-    asked = "x: mean APE at most 2 m, false fixes at most 0, second drive localized"
+    asked = "x: mean APE at most 2\N{NO-BREAK SPACE}m, false fixes at most 0, second drive localized"
     assert limit_lines(towns) == [f"{asked}: held in a; missed in b."]
     assert limit_lines([scenario("c", configuration={"thresholds": {"method": "x"}}, rows=(row("x", 1.0),))]) == []
 

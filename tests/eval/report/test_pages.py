@@ -41,6 +41,23 @@ def test_a_trial_page_says_what_the_text_says_one_figure_a_column(trial):
     assert len(page.all("script")) == 2  # the figure's SVG, and ours
 
 
+def test_rows_that_two_names_tell_apart_keep_both_in_sight_on_a_phone(browser, tmp_path):
+    heads = ["setting", "method", "runs", "APE mean / p95, m", "CPU, s"]
+    rows = [[f"localizer.mode={mode}", method, "1", "1.00 / 2.00", "3"] for mode in ("coupled", "kalman")
+            for method in ("topometric (paper)", "dead reckoning")]  # fmt: skip
+    write_trial_page(tmp_path / "sweep.html", "Sweep", "\n".join(["# Sweep", "", *table(heads, rows)]))
+    tab = browser.open((tmp_path / "sweep.html").as_uri(), width=360)
+    tab.run("document.querySelector('.scroll').scrollLeft = 400")
+    left, right, head = tab.run("""(() => {
+      const edge = document.querySelector('.scroll').getBoundingClientRect().left, row = document.querySelector('tbody tr');
+      const cells = [row.cells[0], row.cells[1], document.querySelectorAll('thead th')[1]];
+      const [one, two, head] = cells.map((cell) => cell.getBoundingClientRect());
+      return [one.left - edge, two.left - one.right, head.left - two.left];
+    })()""")
+    assert max(abs(left), abs(right), abs(head)) < 2
+    look_at(tab)
+
+
 @pytest.mark.parametrize(("width", "dark"), [(1400, False), (390, True)])
 def test_a_trial_page_is_readable(browser, trial, width, dark):
     tab = browser.open(trial.as_uri(), width=width, dark=dark)

@@ -20,8 +20,8 @@ def test_the_title_counts_methods_and_towns():
 
 def test_the_first_sentence_says_how_much_of_the_roads_was_driven():
     tour = {"mapping": {"coverage": 0.25}}
-    assert "0.5 of 2.0 km of road" in lede(Results(scenarios=(scenario("a", tours=tour),)))
-    assert "in 2.0 km of road" in lede(Results(scenarios=(scenario("a"),)))
+    assert "on 0.5 of the 2.0\N{NO-BREAK SPACE}km of road" in lede(Results(scenarios=(scenario("a", tours=tour),)))
+    assert "in 2.0\N{NO-BREAK SPACE}km of road" in lede(Results(scenarios=(scenario("a"),)))
 
 
 def test_equal_rows_and_a_better_dead_reckoning_are_explained():

@@ -109,7 +109,7 @@ def _refined(
         added_lateral_m = unknown_lane_sigma_m(line, arc_m, free)
         bend = curvature(line, arc_m)
         read = None if readings is None else readings.at(arc_m, bend, added_lateral_m, config.loose_m(number))
-        if paint is not None and number == config.paint_round:
+        if paint is not None and number == config.paint_round and np.isfinite(state.poses).all():
             passed, closures = passed_m(paint, state), with_revisits(closures, revisits(paint, state))
         targets = RoadTargets(points, heading, bend, added_lateral_m, road_weight, along_sigma_m, map_error, read, passed)
         if map_error is not None:

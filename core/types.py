@@ -26,6 +26,7 @@ IntArray: TypeAlias = NDArray[np.int32]
 Int8Array: TypeAlias = NDArray[np.int8]
 UInt8Array: TypeAlias = NDArray[np.uint8]
 Frame: TypeAlias = NDArray[np.uint8]  # (H, W, 3) RGB or (H, W) grey
+PAINT_PLACES = 45  # places ahead of a visit at which paint along a border is kept
 UNSEEN_PERCENT = 255  # in the place of a probability in per cent, of what was not seen
 
 
@@ -193,6 +194,8 @@ class LaneReadings(ShortRepr):
     end: UInt8Array  # (S,) 0 nothing, 1 stop line, 2 mouth
     # (S, 2) probability that the left and the right border are the edge of the road, with no lane beyond, or UNSEEN_PERCENT.
     edge_percent: UInt8Array | None = None  # None in maps from before it was kept
+    # (S, 2, PAINT_PLACES) paint ahead along the left and the right border (``core.reading.dashes``); 0 where there is none.
+    paint: UInt8Array | None = None  # None in maps from before it was kept
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -25,7 +25,7 @@ from hippodrome.proto.checks import MAX_DESCRIPTOR_DIMENSIONS, check_map
 from hippodrome.proto.layout import (
     ATTRACTORS,
     EDGES,
-    LANE_EDGES,
+    LANE_EXTRAS,
     LANE_READINGS,
     REFINED_VERTICES,
     ROAD_MATCH,
@@ -162,7 +162,7 @@ def _encode_visits(visits: Visits, header: wire.Header) -> wire.Visits:
     for field, data in _packed(visits, VISITS, header).items():
         setattr(message, field, data)
     if visits.lane is not None:
-        known = LANE_READINGS if visits.lane.edge_percent is None else LANE_READINGS + LANE_EDGES
+        known = LANE_READINGS + tuple(extra for extra in LANE_EXTRAS if getattr(visits.lane, extra[0]) is not None)
         message.lane.CopyFrom(wire.LaneReadings(**_packed(visits.lane, known, header)))
     return message
 
@@ -170,7 +170,7 @@ def _encode_visits(visits: Visits, header: wire.Header) -> wire.Visits:
 def _decode_visits(message: wire.Visits, header: wire.Header) -> Visits:
     visits = Visits(**_unpacked(message, VISITS, header))
     if message.HasField("lane"):
-        known = LANE_READINGS + LANE_EDGES if message.lane.HasField("edge_percent") else LANE_READINGS
+        known = LANE_READINGS + tuple(extra for extra in LANE_EXTRAS if message.lane.HasField(extra[0]))
         visits = replace(visits, lane=LaneReadings(**_unpacked(message.lane, known, header)))
     return visits
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
+from hippodrome.core.types import PAINT_PLACES
+
 Layout: TypeAlias = tuple[tuple[str, str, tuple[str | int, ...]], ...]
 
 TEMPLATE_TYPES = {"gradient": "int8", "grey": "uint8"}
@@ -47,7 +49,10 @@ LANE_READINGS: Layout = (
     ("end_variance_m2", "float32", ("visits",)),
     ("end", "uint8", ("visits",)),
 )
-LANE_EDGES: Layout = (("edge_percent", "uint8", ("visits", 2)),)  # which older maps do not have
+LANE_EXTRAS: Layout = (  # which older maps do not have
+    ("edge_percent", "uint8", ("visits", 2)),
+    ("paint", "uint8", ("visits", 2, PAINT_PLACES)),
+)
 ROAD_MATCH: Layout = (
     ("lane", "int32", ("vertices",)),
     ("position_m", "float64", ("vertices",)),

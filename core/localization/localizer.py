@@ -20,6 +20,7 @@ from hippodrome.core.localization.beliefs.start import start_belief
 from hippodrome.core.localization.competition import relation_of, updated
 from hippodrome.core.localization.config import LocalizerConfig
 from hippodrome.core.localization.fix import Fix, PlaceCheck, RecognisedView, challenger_wins, checked, faded, recognised, status
+from hippodrome.core.localization.paint import PaintSense
 from hippodrome.core.localization.places import LINK_REACH_M, cells_around, make_place_map, may_be_on_road
 from hippodrome.core.localization.recogniser import PlaceMatch, PlaceRecogniser
 from hippodrome.core.localization.road import RoadSense
@@ -108,6 +109,7 @@ class Localizer:
                 "set road_reading to false"
             )
         self._road = RoadSense(roads, config.camera) if config.road_reading and roads is not None else None
+        self._paint = PaintSense(cognitive_map)
         self._since_frame = NOT_MOVED  # metres and rad since the last frame
 
     @property
@@ -146,7 +148,9 @@ class Localizer:
             return
         measurement = road.measure(frame, since.length, since.turn_rad, belief.pose, belief.covariance)
         if measurement is not None:
-            self._belief = belief.inject(measurement)
+            belief = belief.inject(measurement)
+        along = self._paint.measure(road.paint, belief.pose, belief.covariance)
+        self._belief = belief if along is None else belief.inject(along)
 
     def _predict(self, observation: Observation) -> None:
         """Move the belief by the observed self-motion, with the gyro noise that the signal itself shows."""
@@ -160,6 +164,7 @@ class Localizer:
         self._since_query = Step(self._since_query.length + travelled_m, self._since_query.turn_rad + turned_rad)
         if self._road is not None:
             self._road.move(travelled_m)
+            self._paint.move(travelled_m)
             self._since_frame = Step(self._since_frame.length + travelled_m, self._since_frame.turn_rad + turned_rad)
 
     def _query(self, frame: Frame) -> None:

@@ -15,9 +15,10 @@ import numpy as np
 from hippodrome.core.localization.beliefs.motion import PoseMeasurement
 from hippodrome.core.reading import LaneEnd, RoadReader, RoadReading
 from hippodrome.core.reading.borders import CONTRADICTS, FITS, fit_of_borders
+from hippodrome.core.reading.dashes import NO_PAINT
 from hippodrome.core.roads.geometry import RoadGeometry, poses_on_segments, project
 from hippodrome.core.se2 import wrap_compiled
-from hippodrome.core.types import FloatArray, Frame, IntArray
+from hippodrome.core.types import FloatArray, Frame, IntArray, UInt8Array
 from hippodrome.core.views.config import CameraGeometry
 
 REACH_M = 9.0  # two lanes aside and what lies beside the second: lanes farther from the believed position tell nothing
@@ -61,6 +62,7 @@ class RoadSense:
     def __init__(self, roads: RoadGeometry, camera: CameraGeometry) -> None:
         self._roads, self._camera = roads, camera
         self._reader: RoadReader | None = None
+        self._reading = RoadReading()  # of the last frame
         self.since_m = math.inf  # driven since the lane was read last
         self._other_lane = (-1, 0)  # that the borders fit, if not the believed one, and how often they did
         self.since_end_m = math.inf  # and since its end was
@@ -88,11 +90,15 @@ class RoadSense:
         """
         if self._reader is None:
             self._reader = RoadReader(self._camera.on_road(frame.shape[1], frame.shape[0]))
-        reading = self._reader.read(frame, moved_m, turned_rad)
+        self._reading = reading = self._reader.read(frame, moved_m, turned_rad)
         if not reading.sees_lane:
             return None
         lane = self._lane(reading, pose, covariance)
         return None if lane is None else self._measured(reading, lane, pose, covariance)
+
+    def paint(self) -> UInt8Array:
+        """The paint (2, PAINT_PLACES) along the borders of the lane in the frame that was read last."""
+        return NO_PAINT if self._reader is None else self._reader.paint(self._reading)
 
     def _lane(self, reading: RoadReading, pose: FloatArray, covariance: FloatArray) -> _Lane | None:
         """The lane that fits the reading best, if it alone does.

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from hippodrome.core.reading import RoadReader, RoadReading
-from hippodrome.core.types import UNSEEN_PERCENT, Frame, LaneReadings, Observation
+from hippodrome.core.types import PAINT_PLACES, UNSEEN_PERCENT, Frame, LaneReadings, Observation, UInt8Array
 from hippodrome.core.views.config import CameraGeometry
 from hippodrome.core.views.odometry import grey_image, seen_step
 
@@ -36,6 +36,7 @@ class RoadLog:
         self._camera = camera
         self._reader: RoadReader | None = None
         self._readings: list[RoadReading] = []
+        self._paint: list[UInt8Array] = []
         self._scales: deque[float] = deque(maxlen=SCALES)  # metres per unit
         self._before: Frame | None = None  # the last frame, and units and rad since
         self._since_frame = np.zeros(2)
@@ -62,6 +63,7 @@ class RoadLog:
         if self._reader is None:
             self._reader = RoadReader(self._camera.on_road(frame.shape[1], frame.shape[0]))
         self._readings.append(self._reader.read(frame, travelled * self.metres_per_unit, turned_rad))
+        self._paint.append(self._reader.paint(self._readings[-1]))
 
     def _look_at_scale(self, frame: Frame) -> None:
         units, turned_rad = self._since_frame.tolist()
@@ -74,11 +76,11 @@ class RoadLog:
 
     def finish(self) -> LaneReadings:
         """What was read at all keyframes so far."""
-        return lane_readings(self._readings)
+        return lane_readings(self._readings, self._paint)
 
 
-def lane_readings(readings: list[RoadReading]) -> LaneReadings:
-    """Readings, one of each visit, as arrays."""
+def lane_readings(readings: list[RoadReading], paint: list[UInt8Array]) -> LaneReadings:
+    """Readings, one of each visit, as arrays, with the paint (2, PAINT_PLACES) along the borders at each."""
 
     def column(name: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
         return np.array([getattr(reading, name) for reading in readings], dtype=np.float32)
@@ -95,4 +97,5 @@ def lane_readings(readings: list[RoadReading]) -> LaneReadings:
         end_variance_m2=column("end_variance_m2"),
         end=np.array([int(reading.end) for reading in readings], dtype=np.uint8),
         edge_percent=np.where(np.isfinite(edges), np.rint(100.0 * np.nan_to_num(edges)), UNSEEN_PERCENT).astype(np.uint8),
+        paint=np.array(paint, dtype=np.uint8).reshape(-1, 2, PAINT_PLACES),
     )

@@ -10,6 +10,7 @@ import numpy as np
 
 from hippodrome.core.reading.arcs import GRADE, best_arc, fit_arc, line_places
 from hippodrome.core.reading.config import ReaderConfig
+from hippodrome.core.reading.dashes import NO_PAINT, SHARPEST_1PM, paint_along_borders
 from hippodrome.core.reading.ends import stop_line, strip_levels
 from hippodrome.core.reading.ground import Ground, ground_of
 from hippodrome.core.reading.lane import Lines, Place, beside_the_axle, edge_probability, heading_variance_rad2, place_in_lane
@@ -18,7 +19,7 @@ from hippodrome.core.reading.mouth import line_end
 from hippodrome.core.reading.ridges import find_ridges, trust_of
 from hippodrome.core.reading.traits import line_traits
 from hippodrome.core.reading.types import LaneEnd, RoadReading
-from hippodrome.core.types import Float32Array, Frame
+from hippodrome.core.types import Float32Array, Frame, UInt8Array
 from hippodrome.core.views.egomotion.camera import RoadCamera
 
 LEAST_RIDGES: Final = 8  # fewer tell of no road
@@ -37,6 +38,7 @@ class RoadReader:
         self._size_px = (0, 0)
         self._memory = Memory()
         self._width_m, self._width_sigma_m = self._config.lane_width_m, self._config.lane_width_sigma_m
+        self._grey: Float32Array | None = None  # the rows of the last frame that show the road
 
     def read(self, frame: Frame, moved_m: float = math.nan, turned_rad: float = math.nan) -> RoadReading:
         """What the frame (H, W, 3) RGB or (H, W) grey says; variances are ``inf`` for all that is not seen.
@@ -49,7 +51,7 @@ class RoadReader:
         if len(ground.rows) < LEAST_ROWS:
             return RoadReading()
         self._memory.out_of_sight(ground, self._camera.forward_m)
-        grey = self._road(frame, ground)
+        self._grey = grey = self._road(frame, ground)
         lines = self._lines(grey, ground)
         place = None
         if lines is not None:
@@ -75,6 +77,16 @@ class RoadReader:
             left_edge=edge_probability(place, 1),
             right_edge=edge_probability(place, -1),
         )
+
+    def paint(self, reading: RoadReading) -> UInt8Array:
+        """The paint (2, PLACES) along both borders in the frame that was read last, of which ``reading`` is what it said.
+
+        It is 0 where no lane was seen, and in sharp bends, where borders are not where the lane's middle has them.
+        """
+        if self._grey is None or self._ground is None or not reading.sees_lane or abs(reading.curvature_1pm) > SHARPEST_1PM:
+            return NO_PAINT
+        arc = np.array([-reading.heading_rad, reading.curvature_1pm, reading.curvature_change_1pm2])
+        return paint_along_borders(self._grey, self._ground.x_m, self._ground.y_m, arc, -reading.offset_m, self._width_m)
 
     def _ground_of(self, frame: Frame) -> Ground:
         size_px = frame.shape[1], frame.shape[0]

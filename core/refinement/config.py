@@ -22,6 +22,7 @@ class SolverConfig:
     inner_iterations: int = 2
     reprojection_m: float = 4.0  # arc length by which a keyframe's place on the route may move in one round
     unvouched_weight: float = 1e-6  # weight of the road where nothing vouches for it: it determines a pose without pulling it
+    paint_round: int = 6  # round from which on paint is compared, as keyframes are near their places by then; -1: never
     survey_sigma_m: float | None = None  # sigma per axis of the error of the road network; None: what the network says of itself
     survey_freedom: float | None = 5.0  # errors that count as seen before the drive: how well sigma is known; None: exactly
     survey_length_m: float = 60.0  # correlation length of that error: neighbouring roads are drawn wrong alike

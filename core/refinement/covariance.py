@@ -67,7 +67,10 @@ def _with_exact_map(state: State, factors: Factors) -> tuple[State, Factors]:
         replace(part, source=part.source[..., :4], target=part.target[..., :4]) for part in (factors.odometry, factors.closures)
     )
     read = None if factors.read is None else replace(factors.read, jacobian=factors.read.jacobian[..., :4])
-    return replace(state, map_error_m=None), Factors(odometry, road, closing, None, read)
+    passed = factors.passed
+    if passed is not None:
+        passed = replace(passed, source=passed.source[..., :4], target=passed.target[..., :4])
+    return replace(state, map_error_m=None), Factors(odometry, road, closing, None, read, passed)
 
 
 def _without_closures(state: State, factors: Factors, closures: Edges) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from hippodrome.core.refinement.factors import BinaryFactors, State, UnaryFactors, normal_blocks
 from hippodrome.core.refinement.noise import Noise
+from hippodrome.core.refinement.paint import PAINT_EDGE
 from hippodrome.core.types import Edges, FloatArray, Visits
 
 LEAST_APART_M = 0.1  # places closer than this have one error of the map, but the equations must keep their condition
@@ -43,10 +44,10 @@ def map_error_factors(state: State, visits: Visits, closures: Edges, model: MapE
     """
     error = state.map_error_m
     assert error is not None
-    scale = np.exp(state.log_scale)
+    scale = np.where(closures.kind == PAINT_EDGE, 1.0, np.exp(state.log_scale[closures.source]))
     keep = np.exp(-np.maximum(driven_m(state, visits), LEAST_APART_M) / model.length_m)
     step_gain = 1.0 / (model.sigma_m * np.sqrt(1.0 - keep**2))
-    apart = np.maximum(scale[closures.source] * np.hypot(closures.motion[:, 0], closures.motion[:, 1]), LEAST_APART_M)
+    apart = np.maximum(scale * np.hypot(closures.motion[:, 0], closures.motion[:, 1]), LEAST_APART_M)
     closure_gain = 1.0 / (model.sigma_m * np.sqrt(-2.0 * np.expm1(-apart / model.length_m)))
     first = np.zeros((1, 2, state.width))
     first[0, 0, 4] = first[0, 1, 5] = 1.0 / model.sigma_m

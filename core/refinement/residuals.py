@@ -17,6 +17,7 @@ import numpy as np
 from hippodrome.core.refinement.factors import BinaryFactors, State, UnaryFactors, normal_blocks
 from hippodrome.core.refinement.map_error import MapErrorFactors, MapErrorModel, add_map_error, map_error_factors
 from hippodrome.core.refinement.noise import Noise
+from hippodrome.core.refinement.paint import PAINT_EDGE, passed_factors
 from hippodrome.core.refinement.readings import ReadTargets, reading_factors
 from hippodrome.core.se2 import between, wrap
 from hippodrome.core.solvers.chain import ChainSystem
@@ -42,6 +43,7 @@ class RoadTargets:
     along_sigma_m: float  # sigma along the lane; infinite: the keyframe is drawn to the line, not to a point of it
     map_error: MapErrorModel | None = None  # None: the map is taken as exact
     read: ReadTargets | None = None  # what the camera read of the road
+    passed_m: FloatArray | None = None  # (S - 1,) way to the next keyframe by the paint that passed; nan: not told
     bend_1pm: FloatArray | None = None  # (S,) by which the lane's heading changes along it; None: it is that of the point
 
 
@@ -53,6 +55,7 @@ class Factors(NamedTuple):
     closures: BinaryFactors  # along the closure edges
     map_error: MapErrorFactors | None = None  # where the map is not taken as exact
     read: UnaryFactors | None = None  # where the road was read
+    passed: BinaryFactors | None = None  # from each keyframe to the next, by the paint that passed
 
 
 def all_factors(
@@ -65,6 +68,7 @@ def all_factors(
         closure_factors(state, closures, noise),
         None if targets.map_error is None else map_error_factors(state, visits, closures, targets.map_error),
         None if targets.read is None else reading_factors(state, targets.points_m, targets.heading_rad, targets.read),
+        None if targets.passed_m is None else passed_factors(state, targets.passed_m, len(state.gyro)),
     )
 
 
@@ -155,17 +159,20 @@ def closure_factors(state: State, closures: Edges, noise: Noise) -> BinaryFactor
         r_ab = Sigma^(-1/2) (R_a^T (p_b - p_a) - e^{s_a} p_ab,  warp(psi_b - psi_a - psi_ab))
 
     That is Eq. (11), Li et al. 2025, with the scale at the source as an unknown. Source and target of ``closures`` are keyframes.
+    Paint that was seen again tells metres, so that its scale is 1, and its noise is known.
     """
     a, b = state.poses[closures.source], state.poses[closures.target]
-    scale = np.exp(state.log_scale[closures.source])[:, None]
+    paint = closures.kind == PAINT_EDGE
+    scale = np.where(paint, 1.0, np.exp(state.log_scale[closures.source]))[:, None]
     seen, metres = between(a, b), scale * closures.motion[:, :2]
     residual = np.column_stack([seen[:, :2] - metres, wrap(seen[:, 2] - closures.motion[:, 2])])
     source, target = _relative_pose_jacobians(a, seen, state.width)
     source, target = source[:, :3], target[:, :3]
-    source[:, :2, 3] = -metres
+    source[:, :2, 3] = np.where(paint[:, None], 0.0, -metres)
     per_sigma = 1.0 / (noise.closure_factor * np.column_stack([scale * closures.sigma[:, :2], closures.sigma[:, 2]]))
     if noise.closure_along_factor is not None:
         per_sigma[:, 0] *= noise.closure_factor / noise.closure_along_factor
+    per_sigma[paint] = 1.0 / closures.sigma[paint]
     weight = geman_mcclure_weight(np.sum((residual * per_sigma) ** 2, axis=1), GEMAN_MCCLURE**2)
     gain = per_sigma * np.sqrt(weight)[:, None]
     no_gyro, weights = np.zeros((len(a), 3, 2)), np.repeat(weight[:, None], 3, 1)
@@ -177,7 +184,7 @@ def normal_equations(state: State, factors: Factors, closures: Edges) -> ChainSy
 
     The coupling J_a^T J_b between the two ends of a closure lies off the chain and is left out: the solver adds it.
     """
-    odometry, road, closing, map_error, read = factors
+    odometry, road, closing, map_error, read, passed = factors
     diagonal, rhs = normal_blocks(road.jacobian, road.residual)
     if read is not None:
         read_diagonal, read_rhs = normal_blocks(read.jacobian, read.residual)
@@ -193,6 +200,12 @@ def normal_equations(state: State, factors: Factors, closures: Edges) -> ChainSy
         np.add.at(diagonal, keyframe, blocks)
         np.add.at(rhs, keyframe, sides)
     upper = np.einsum("nmi,nmj->nij", odometry.source, odometry.target)
+    if passed is not None:
+        for ends, jacobian in ((slice(None, -1), passed.source), (slice(1, None), passed.target)):
+            blocks, sides = normal_blocks(jacobian, passed.residual)
+            diagonal[ends] += blocks
+            rhs[ends] += sides
+        upper += np.einsum("nmi,nmj->nij", passed.source, passed.target)
     if map_error is not None:
         add_map_error(map_error, closures, diagonal, upper, rhs)
     border = np.zeros((len(state.poses), state.width, len(state.gyro)))

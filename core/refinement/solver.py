@@ -15,6 +15,7 @@ from hippodrome.core.refinement.covariance import covariance_under_map_error, po
 from hippodrome.core.refinement.factors import State
 from hippodrome.core.refinement.map_error import MapErrorModel, driven_m, map_error_factors, shown_sigma_m
 from hippodrome.core.refinement.noise import Noise, rescaled, variance_factors
+from hippodrome.core.refinement.paint import PAINT_EDGE, painted, passed_m, revisits, with_revisits
 from hippodrome.core.refinement.readings import ReadLanes
 from hippodrome.core.refinement.residuals import (
     Factors,
@@ -100,13 +101,17 @@ def _refined(
     noise = Noise() if readings is None else Noise(closure_along_factor=1.0)
     scale_step_variance = prior_scale_step_variance(state, visits, noise)
     road_weight = np.maximum(vouched, config.unvouched_weight)
+    paint = None if network is None else painted(visits)
+    passed = None
     for number, along_sigma_m in enumerate(config.along_sigma_m):
         arc_m = reproject(line, state.drawn_points_m, arc_m, config.reprojection_m)
         points, heading = points_on_line(line, arc_m)
         added_lateral_m = unknown_lane_sigma_m(line, arc_m, free)
         bend = curvature(line, arc_m)
         read = None if readings is None else readings.at(arc_m, bend, added_lateral_m, config.loose_m(number))
-        targets = RoadTargets(points, heading, bend, added_lateral_m, road_weight, along_sigma_m, map_error, read)
+        if paint is not None and number == config.paint_round and np.isfinite(state.poses).all():
+            passed, closures = passed_m(paint, state), with_revisits(closures, revisits(paint, state))
+        targets = RoadTargets(points, heading, bend, added_lateral_m, road_weight, along_sigma_m, map_error, read, passed)
         if map_error is not None:
             targets = replace(targets, bend_1pm=signed_curvature(line, arc_m, max(CAR_M, BEND_SIGMAS * map_error.sigma_m)))
         for _ in range(config.inner_iterations):
@@ -208,14 +213,15 @@ def estimate_noise(
     For a step of the log scale, J Sigma J^T over its robust weight and times its prior variance is its posterior variance. The
     next round adds it to the squared step when it sets the robust weight (``odometry_factors``).
     """
-    odometry, road, closing, _, _ = all_factors(state, visits, closures, targets, noise, scale_step_variance)
+    odometry, road, closing, *_ = all_factors(state, visits, closures, targets, noise, scale_step_variance)
     own, next_ = marginals(factor)
     joint = np.block([[own[:-1], next_], [np.swapaxes(next_, 1, 2), own[1:]]])
     jacobian = np.concatenate([odometry.source, odometry.target], axis=2)
     odometry_used = np.einsum("nmi,nij,nmj->nm", jacobian, joint, jacobian)
     road_used = np.einsum("nmi,nij,nmj->m", road.jacobian, own, road.jacobian)
-    each_sq = closing.residual**2 / np.maximum(closing.weight[:, :1], 1e-12)
-    unweighted_sq = np.sum(closing.residual**2, axis=1) / np.maximum(closing.weight[:, 0], 1e-12)
+    of_views = closures.kind != PAINT_EDGE
+    each_sq = closing.residual[of_views] ** 2 / np.maximum(closing.weight[of_views, :1], 1e-12)
+    unweighted_sq = np.sum(each_sq, axis=1)
     updated = rescaled(
         noise,
         variance_factors(odometry.residual, len(odometry.residual), np.sum(odometry_used, axis=0)),

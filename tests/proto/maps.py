@@ -4,7 +4,7 @@ from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 
-from hippodrome.core.types import AttractorStates, CognitiveMap, Edges, LaneReadings, RoadMatch, ViewCells, Visits
+from hippodrome.core.types import PAINT_PLACES, AttractorStates, CognitiveMap, Edges, LaneReadings, RoadMatch, ViewCells, Visits
 
 
 def random_map(
@@ -65,6 +65,7 @@ def random_readings(rng, count):
     return LaneReadings(
         *pairs, value(), value(), value(), variance(), np.where(seen, rng.integers(0, 3, count), 0).astype(np.uint8),
         np.where(seen[:, None], rng.integers(0, 101, (count, 2)), 255).astype(np.uint8),
+        np.where(seen[:, None, None], rng.integers(0, 251, (count, 2, PAINT_PLACES)), 0).astype(np.uint8),
     )  # fmt: skip
 
 

@@ -226,14 +226,16 @@ def test_a_map_with_readings_is_read_by_programs_that_know_none(tmp_path):
     assert (version, stripped) == read_stream(tmp_path / "plain", FORMAT_VERSION)
 
 
-def test_readings_from_before_the_kinds_of_borders_were_kept_are_read(tmp_path):
+@pytest.mark.parametrize("later", [("edge_percent", "paint"), ("paint",)])
+def test_readings_from_before_kinds_of_borders_and_paint_were_kept_are_read(tmp_path, later):
     read = random_map(read=True)
-    older = replace(read, visits=replace(read.visits, lane=replace(read.visits.lane, edge_percent=None)))
+    older = replace(read, visits=replace(read.visits, lane=replace(read.visits.lane, **dict.fromkeys(later))))
     save_map(tmp_path / "older", older, PROVENANCE)
-    assert load_map(tmp_path / "older")[0].visits.lane.edge_percent is None
+    loaded = load_map(tmp_path / "older")[0].visits.lane
+    assert all(getattr(loaded, name) is None for name in later)
     save_map(tmp_path / "newer", read, PROVENANCE)
     loaded = load_map(tmp_path / "newer")[0].visits.lane
-    assert loaded.edge_percent.tobytes() == read.visits.lane.edge_percent.tobytes()
+    assert all(getattr(loaded, name).tobytes() == getattr(read.visits.lane, name).tobytes() for name in later)
 
 
 @pytest.mark.parametrize(

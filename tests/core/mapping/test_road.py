@@ -5,7 +5,7 @@ import pytest
 
 from hippodrome.core.mapping.mapper import MapperConfig, map_drive
 from hippodrome.core.mapping.road import ENOUGH, RoadLog
-from hippodrome.core.types import Observation
+from hippodrome.core.types import PAINT_PLACES, Observation
 from hippodrome.core.views.odometry import CameraGeometry
 from tests.core.mapping.test_mapper import ring_drive
 
@@ -16,6 +16,7 @@ def test_a_map_keeps_a_reading_of_each_visit_and_is_the_same_otherwise():
     assert plain.visits.lane is None
     assert len(read.visits.lane.offset_m) == len(read.visits.t_s)
     assert read.visits.lane.edge_percent.shape == (len(read.visits.t_s), 2)
+    assert read.visits.lane.paint.shape == (len(read.visits.t_s), 2, PAINT_PLACES)
     for name in ("t_s", "poses", "view_cell"):
         assert getattr(plain, name).tobytes() == getattr(read, name).tobytes()
     assert plain.visits.motion.tobytes() == read.visits.motion.tobytes()

@@ -25,6 +25,8 @@ BESIDE_M: Final[FloatArray] = np.arange(1.0, 2.7, 0.2)  # from a way, where the 
 GAP_PLACES: Final = 4  # places of a way without a border beside them, from which on it has ended: not a dent in it
 BEYOND_M: Final = (6.4, 8.0)  # beyond the end of the border the road goes on, if there is road
 GOES_ON: Final = 0.6  # so much of that must be seen, and be road
+STRETCH: Final = 4  # places of a way that are judged together: far ahead the rows of a frame lie a metre apart ..
+STRETCH_SEEN: Final = 0.25  # .. so that no more of them may have been seen
 
 
 def seems_road(ground: Ground, ahead: FloatArray) -> bool:
@@ -39,6 +41,23 @@ def seems_road(ground: Ground, ahead: FloatArray) -> bool:
     can_be_seen = seen | ground.in_view(points)
     enough = np.mean(seen) > LEAST_SEEN and np.sum(seen) > SEEN * np.sum(can_be_seen)
     return bool(enough and np.mean(kinds == OTHER) < NOT_ROAD)
+
+
+def seen_road_m(ground: Ground, ahead: FloatArray, end_m: float) -> float:
+    """How far along a way (n, 3), in the vehicle's axes, it has been seen to be road; ``end_m`` where all of it has been.
+
+    Args:
+        ground: what was seen of it.
+        ahead: poses of the way, evenly spaced, in the vehicle's axes.
+        end_m: length of the way up to the last of them.
+    """
+    if len(ahead) < STRETCH:
+        return 0.0
+    kinds = ground.kinds_at(strip(ahead, HALF_BODY_M)).reshape(3, len(ahead))
+    stretches = np.lib.stride_tricks.sliding_window_view(kinds, STRETCH, axis=1)
+    seen, other = np.mean(stretches != UNKNOWN, axis=(0, 2)), np.mean(stretches == OTHER, axis=(0, 2))
+    ends = np.flatnonzero((seen < STRETCH_SEEN) | (other > OFF_ROAD))
+    return end_m if len(ends) == 0 else end_m * float(ends[0]) / (len(ahead) - 1)
 
 
 def leads_off_road(ground: Ground, ahead: FloatArray) -> bool:

@@ -71,7 +71,7 @@ def without_islands(part: UInt8Array) -> UInt8Array:
     a junction, where a line along the borders would lead round it on the side of the oncoming lane.
     """
     other = (part == OTHER).astype(np.uint8)
-    count, label, stats, _ = cv2.connectedComponentsWithStats(cv2.morphologyEx(other, cv2.MORPH_CLOSE, STRIPES), connectivity=8)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(cv2.morphologyEx(other, cv2.MORPH_CLOSE, STRIPES), connectivity=8)
     island = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) * CELL_M < ISLAND_M
     island[0] = False
     if not island.any():

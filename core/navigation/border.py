@@ -23,7 +23,7 @@ LINE_INSIDE_M = 0.2  # of the kerb an edge line is painted, at least: .25 m in l
 LONGEST_DASH_M = 3.7  # a dash has 3 m
 GAP_CELLS = 13.0  # a border goes on where it was hidden, over twice so many cells: round a corner the car looks past it
 STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
-ISLAND_M = 1.5  # what is no road and no longer than that, with road about it, is none: dirt, or the end of a dash seen askew
+ISLAND_M = 1.5  # what is no road and no longer than that, joined to nothing, is no border: dirt, or the end of a dash seen askew
 UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
 LANE_M = 3.2  # from the border of the other side the own lane is a lane more away than from the own one
 MOST_TURN_RAD = 1.9

@@ -17,6 +17,7 @@ from hippodrome.core.types import FloatArray
 SEEN, NOT_ROAD = 0.7, 0.05  # so much of a guess, as far as it can be seen, must have been, and hardly any of it be no road
 LEAST_SEEN: Final = 0.4  # of all of it
 EDGES_M: Final = 12.0  # about the vehicle, within which lines at the edge are looked for
+ON_EDGE: Final = 0.1  # of a guess: one place alone is a speck
 BODY_M: Final[FloatArray] = np.linspace(-0.8, 0.8, 17)  # across the body: a line is hardly as wide as a cell
 AHEAD_M, HALF_BODY_M = (2.0, 11.0), 0.8  # of a way, which must not lead off the road
 OFF_ROAD: Final = 0.15  # of it
@@ -46,11 +47,11 @@ def seems_road(ground: Ground, ahead: FloatArray) -> bool:
     seen = kinds != UNKNOWN
     can_be_seen = seen | ground.in_view(points)
     enough = np.mean(seen) > LEAST_SEEN and np.sum(seen) > SEEN * np.sum(can_be_seen)
-    return bool(enough and np.mean(kinds == OTHER) < NOT_ROAD and edge_share(ground, ahead) < NOT_ROAD)
+    return bool(enough and np.mean(kinds == OTHER) < NOT_ROAD and edge_share(ground, ahead) < ON_EDGE)
 
 
 def edge_share(ground: Ground, ahead: FloatArray) -> float:
-    """Which share of what the body covers on a way (n, 3), in the vehicle's axes, is a painted line at the road's edge.
+    """On which share of the places of a way (n, 3), in the vehicle's axes, the body is on a painted line at the road's edge.
 
     In fog a pavement has the level of asphalt, and the line is what tells where the road ends.
     """
@@ -63,7 +64,9 @@ def edge_share(ground: Ground, ahead: FloatArray) -> float:
     y = ground.pose[1] + sin * points_m[:, 0] + cos * points_m[:, 1]
     i, j = (np.floor((value - low) / CELL_M).astype(np.int64) for value, low in ((x, corner_m[0]), (y, corner_m[1])))
     inside = (i >= 0) & (j >= 0) & (i < edges.shape[0]) & (j < edges.shape[1])
-    return float(np.mean(edges[i[inside], j[inside]])) if inside.any() else 0.0
+    on_edge = np.zeros(len(points_m), dtype=np.bool_)
+    on_edge[inside] = edges[i[inside], j[inside]]
+    return float(np.mean(on_edge.reshape(len(ahead), -1).any(axis=1)))
 
 
 def seen_ahead(ground: Ground, ahead: FloatArray, from_m: float) -> tuple[bool, float]:

@@ -23,6 +23,7 @@ LINE_INSIDE_M = 0.2  # of the kerb an edge line is painted, at least: .25 m in l
 LONGEST_DASH_M = 3.7  # a dash has 3 m
 GAP_CELLS = 13.0  # a border goes on where it was hidden, over twice so many cells: round a corner the car looks past it
 STRIPES = np.ones((7, 7), dtype=np.uint8)  # far ahead the rows of a frame lie so many cells apart
+ISLAND_M = 1.5  # what is no road and no longer than that, joined to nothing, is no border: dirt, or the end of a dash seen askew
 UNSEEN_1PM = 0.06  # without any border, one turns gently to the own side
 LANE_M = 3.2  # from the border of the other side the own lane is a lane more away than from the own one
 MOST_TURN_RAD = 1.9
@@ -39,6 +40,7 @@ def borders(part: UInt8Array) -> UInt8Array:
     was not seen is taken for what is nearest of all that was: behind a kerb there is no road, and round a corner, where one
     sees past the kerb's end, the border is expected half-way between the kerb and the last line of sight.
     """
+    part = without_islands(part)
     other = cv2.morphologyEx((part == OTHER).astype(np.uint8), cv2.MORPH_OPEN, SPECK)
     paint = (part == PAINT).astype(np.uint8)
     thick = cv2.dilate(cv2.morphologyEx(paint, cv2.MORPH_OPEN, SPECK), SPECK)
@@ -60,6 +62,21 @@ def borders(part: UInt8Array) -> UInt8Array:
     to_free, to_barred = (cv2.distanceTransform(1 - kind.astype(np.uint8), cv2.DIST_L2, 5) for kind in (free, barred))
     behind = (seen == 0) & (to_barred < to_free)
     return np.asarray(found | closed.astype(np.uint8) | behind.astype(np.uint8), dtype=np.uint8)
+
+
+def without_islands(part: UInt8Array) -> UInt8Array:
+    """Cells (n, m) with road where there were only specks of what is no road.
+
+    The end of a dash that is seen askew has the level of a kerbstone, and lies in the middle of the road: in a sharp bend, or at
+    a junction, where a line along the borders would lead round it on the side of the oncoming lane.
+    """
+    other = (part == OTHER).astype(np.uint8)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(cv2.morphologyEx(other, cv2.MORPH_CLOSE, STRIPES), connectivity=8)
+    island = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) * CELL_M < ISLAND_M
+    island[0] = False
+    if not island.any():
+        return part
+    return np.where(island[label] & (part == OTHER), np.uint8(ROAD), part)
 
 
 def room_fields(part: UInt8Array) -> tuple[FloatArray, FloatArray]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from hippodrome.core import se2
 from hippodrome.core.navigation.agreement import WAY_STEP_M, LaneField, agreed_m, lane_field
-from hippodrome.core.navigation.caution import leads_off_road, seems_road, turn_mps
+from hippodrome.core.navigation.caution import guess_mps, leads_off_road, seen_ahead, turn_mps
 from hippodrome.core.navigation.config import NavigatorConfig
 from hippodrome.core.navigation.course import Course, make_course, path_poses, place_on
 from hippodrome.core.navigation.driving import pace
@@ -43,7 +43,7 @@ LOOK_M: Final = 26.0  # of a way
 WAY_M: Final = 45.0  # of a way that is driven: another one is looked for before its end
 AGREED, GUESSED = 0.9, 0.6  # share of the poses that have a lane where the way is; with less, it is driven at a walk
 GUESS_FITS: Final = 0.85  # where the ground fits worse, even what all places agree on is a guess
-SEEN_M, CAUTION_M = (2.0, 8.0), (1.0, 14.0)  # of a guess what must have been seen, and be road; where the road may bend away
+SEEN_M, CAUTION_M = (2.0, 14.0), (1.0, 14.0)  # of a guess what may have been seen to be road; where the road may bend away
 NEW_M, NEW_AFTER_M = 12.0, 3.0  # so much of it must be a way to be driven sooner after driving on sight: they come and go
 BEFORE_END_M: Final = 0.3  # the bumper stops so far before a stop line or a junction's mouth that is seen
 LEAST_M, SPARE_M = 5.0, 2.5  # of a way that is agreed on; and what is left over of it when the vehicle stops
@@ -51,10 +51,9 @@ LIKELY: Final = 0.5  # share of a place from which the way to the goal is driven
 RIVAL: Final = 0.25  # the place that is followed is given up where another has four times its weight
 PULL: Final = 0.5  # by which the pose is taken to the particles' mean each time
 TRY_EVERY_M: Final = 2.0  # trying ways costs milliseconds
-NEAR_GOAL_M: Final = 25.0  # whoever is not sure of the place does not stop at the goal
-OFF_ROAD_LOOKS: Final = 2  # that say that the way leads off the road
+NEAR_GOAL_M, OFF_ROAD_LOOKS = 25.0, 2  # who is not sure of the place does not stop there; looks that tell a way off the road
 FIX_SHARE, FIX_SIGMA_M, FIX_FITS, FIX_M = 0.99, 1.8, 0.85, 30.0  # a place so sure over so much way is a fix
-SAME_PLACE_M, GUIDED_MPS, GUESSED_MPS = 12.0, 6.0, 2.0  # hypotheses so near to the goal are of one place
+SAME_PLACE_M, GUIDED_MPS = 12.0, 6.0  # hypotheses so near to the goal are of one place
 REASON, GUESS = "drives where all likely places have a lane", "creeps where most likely places have a lane"
 
 
@@ -79,7 +78,7 @@ class Guide:
         self._off_road, self._is_off_road = 0, False
         self._turned_round = self._sees_road = False
         self._end_m = math.inf  # to the end of the lane that was seen last
-        self._most_mps = math.inf  # where the road may bend away
+        self._most_mps, self._road_m = math.inf, 0.0  # where the road may bend away; of the way that is seen to be road
         self._side = 1.0 if keeps_left(planner.roads) else -1.0
         self._on_sight_m = 0.0  # since a way was driven last
         self.places_given_up = 0  # that were followed
@@ -173,7 +172,7 @@ class Guide:
             self._since_try_m = 0.0
             self._try(best, poses, senses)
         ahead = self._ahead(*SEEN_M)
-        self._sees_road = ahead is not None and seems_road(senses.ground, ahead)
+        self._sees_road, self._road_m = (False, 0.0) if ahead is None else seen_ahead(senses.ground, ahead, SEEN_M[0])
 
     def _see_end(self, reading: RoadReading | None, distance_m: float) -> None:
         """Remember the end of the lane that was seen."""
@@ -274,9 +273,10 @@ class Guide:
         """What to do on the way that is agreed on; None where that is too short."""
         config = self._config
         left_m, most_mps, reason = self.agreed_m - self._since_look_m, GUIDED_MPS, REASON
-        if left_m < LEAST_M - 1.0 or self.whereabouts.fits < GUESS_FITS:
+        is_agreed = left_m >= LEAST_M - 1.0
+        if not is_agreed or self.whereabouts.fits < GUESS_FITS:
             left_m = max(left_m, self.guessed_m - self._since_look_m) if self._sees_road else 0.0
-            most_mps, reason = GUESSED_MPS, GUESS
+            most_mps, reason = guess_mps(is_agreed, self._road_m - self._since_look_m, config), GUESS
         is_new = 0.0 < self._on_sight_m < NEW_AFTER_M and left_m < NEW_M
         if self.plan is None or self.pose is None or left_m < LEAST_M - 1.0 or is_new:
             self._on_sight_m = max(self._on_sight_m, 0.01)

@@ -17,6 +17,12 @@ def stopping_mps(distance_m: float, braking_mps2: float) -> float:
     return math.sqrt(2.0 * braking_mps2 * max(distance_m, 0.0))
 
 
+def in_sight_mps(distance_m: float, config: DriveConfig) -> float:
+    """The speed from which one stops within what is in sight: d = v t + v^2 / (2 b), as the speed follows the wanted one late."""
+    lag_s, braking = 1.0 / config.speed_gain_1ps, config.braking_mps2
+    return braking * (math.sqrt(lag_s**2 + 2.0 * max(distance_m, 0.0) / braking) - lag_s)
+
+
 def can_stop(distance_m: float, speed_mps: float, braking_mps2: float) -> bool:
     """Whether one can still stop within a distance."""
     return speed_mps**2 <= 2.0 * braking_mps2 * max(distance_m, 0.0) + 1e-9

@@ -61,6 +61,21 @@ def test_edge_lines_are_borders_and_dashes_and_stop_lines_are_none():
     assert not found[:, 30:50].any() and not found[101, 25:35].any()
 
 
+def test_specks_in_the_road_are_no_borders_and_what_bars_it_is_one():
+    part = cells()
+    part[:, 41:] = OTHER
+    part[60:63, 20:25] = OTHER  # the end of a dash that is seen askew: .6 m by 1 m
+    part[100:110, 18:24] = OTHER  # 2 m long
+    found = borders(part)
+    assert not found[55:70, 15:30].any() and found[102:108, 20:22].all() and found[:, 45].all()
+    rows = cells()
+    for k in range(60, 120, 6):  # a kerb far ahead, of which each row of a frame shows a piece
+        rows[k : k + 3, 10:15] = OTHER
+    assert borders(rows)[62:114, 12].all()
+    line_m, room_m = room_fields(part)
+    assert line_m[61, 22] > 3.0 and room_m[61, 22] > 3.0
+
+
 def test_beside_a_painted_edge_there_is_more_room_than_beside_a_kerb():
     part = cells()
     part[:, 40] = PAINT

@@ -44,6 +44,9 @@ class Eyes:
         cells = np.clip(cells, 0, np.array(self._raster.levels.shape) - 1)
         return np.where(self._raster.levels[cells[:, 0], cells[:, 1]] > 2, 1, 2).astype(np.uint8)
 
+    def around(self, reach_m):
+        return np.zeros((1, 1), dtype=np.uint8), self.pose[:2]
+
     def in_view(self, points_m):
         return np.ones(len(points_m), dtype=bool)
 
@@ -220,7 +223,7 @@ def test_a_stop_line_that_is_seen_holds_the_vehicle_where_no_hypothesis_has_one(
 
 
 @pytest.mark.parametrize("sees", [True, False])
-def test_where_all_places_fit_badly_it_creeps_on_road_that_it_sees_and_nowhere_else(sees):
+def test_where_all_places_fit_badly_it_drives_as_far_as_it_sees_road_and_nowhere_else(sees):
     eyes = Eyes(twins())
     guide = guided(eyes)
     assert guide.command(Radar(), 1.0).reason == REASON
@@ -232,7 +235,12 @@ def test_where_all_places_fit_badly_it_creeps_on_road_that_it_sees_and_nowhere_e
     command = guide.command(Radar(), 3.0)
     assert (command is not None) is sees
     if sees:
-        assert command.reason == GUESS and command.acceleration_mps2 < 0.0
+        assert command.reason == GUESS and guide.command(Radar(), 5.5).acceleration_mps2 < 0.0 < command.acceleration_mps2
+        far = eyes.kinds_at
+        eyes.kinds_at = lambda points_m: np.where(points_m[:, 0] < 6.0, far(points_m), 0).astype(np.uint8)
+        guide.step(1.1, 0.0, eyes, None, None)
+        guide.whereabouts.fits = 0.8
+        assert guide.command(Radar(), 3.0).acceleration_mps2 < 0.0
 
 
 def test_a_recognised_view_that_no_hypothesis_has_becomes_one():

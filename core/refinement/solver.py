@@ -30,6 +30,7 @@ from hippodrome.core.types import Edges, FloatArray, Visits
 
 MOST_CG_STEPS = 100  # iterations of conjugate gradients; 10-30 are usual, and the next round makes up for a step cut short
 
+UNTOLD_SIGMA = 1000.0  # (m, rad) of what nothing tells
 CAR_M = 4.0  # a car's length, over which a bend is seen at least
 BEND_SIGMAS = 4.0  # half the length over which a bend tells the place along it, in sigmas of the map: so far off it is drawn
 
@@ -78,14 +79,26 @@ def refine_along_route(
         network: the roads of the line, if what was read of them is to be used.
 
     Where the whole line is straight, nothing tells how far along it the keyframes are, nor their scale. They are then held to
-    where the search has put them, loosely, so that a large covariance says so.
+    where the search has put them, loosely, so that a large covariance says so. Of what even then nothing tells it is
+    ``UNTOLD_SIGMA`` squared.
     """
     for most_sigma_m in (np.inf, *_HELD_SIGMAS_M):
         held = replace(config, along_sigma_m=tuple(min(sigma_m, most_sigma_m) for sigma_m in config.along_sigma_m))
         solution = _refined(visits, closures, line, arc_m, log_scale, vouched, free, held, network)
         if np.isfinite(solution.state.poses).all() and np.isfinite(solution.covariance).all():
             break
-    return solution
+    told, assumed = _all_told(solution.covariance), _all_told(solution.assumed_covariance)
+    return replace(solution, covariance=told, assumed_covariance=assumed)
+
+
+def _all_told(covariance: FloatArray) -> FloatArray:
+    """Covariances (S, B, B), those that are not finite as of poses of which nothing is known.
+
+    So end drives that lead nowhere: their scale goes to zero, and with it what the wheels tell.
+    """
+    told = covariance.copy()
+    told[~np.isfinite(covariance).all(axis=(1, 2))] = UNTOLD_SIGMA**2 * np.eye(covariance.shape[1])
+    return told
 
 
 def _refined(

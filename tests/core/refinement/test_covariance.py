@@ -10,6 +10,7 @@ from hippodrome.core.refinement.residuals import (
     all_factors,
     normal_equations,
 )
+from hippodrome.core.refinement.solver import _all_told
 from hippodrome.core.solvers.chain import factorise, marginals
 from hippodrome.core.types import EdgeKind, Edges, Visits
 
@@ -100,3 +101,11 @@ def test_an_exact_map_and_one_that_hardly_errs_have_the_same_covariance():
 def test_what_never_averages_out_is_added_to_both_axes():
     added = with_systematic_errors(np.zeros((2, 6, 6)))
     np.testing.assert_allclose(added[1], np.diag([0.01, 0.01, 1e-4, 0.0, 0.0, 0.0]))
+
+
+def test_of_what_is_not_finite_nothing_is_known():
+    covariance = np.tile(0.1 * np.eye(4), (3, 1, 1))
+    covariance[1, 2, 0] = np.nan
+    told = _all_told(covariance)
+    np.testing.assert_array_equal(told[[0, 2]], covariance[[0, 2]])
+    np.testing.assert_array_equal(told[1], 1e6 * np.eye(4))

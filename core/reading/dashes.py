@@ -13,7 +13,7 @@ from typing import Final
 import numba
 import numpy as np
 
-from hippodrome.core.reading.traits import y_on_line
+from hippodrome.core.reading.traits import mean_between, y_on_line
 from hippodrome.core.types import PAINT_PLACES, Float32Array, FloatArray, UInt8Array
 
 FIRST_M: Final = 3.6  # ahead of the rear axle: nearer, the frame does not reach aside to the borders
@@ -75,8 +75,8 @@ def paint_along_borders(
             ):
                 top = max(top, grey[row, k])
             beside = max(
-                _mean(grey[row], u - FLANK_M[1] / metres, u - FLANK_M[0] / metres),
-                _mean(grey[row], u + FLANK_M[0] / metres, u + FLANK_M[1] / metres),
+                mean_between(grey[row], u - FLANK_M[1] / metres, u - FLANK_M[0] / metres, 0.0),
+                mean_between(grey[row], u + FLANK_M[0] / metres, u + FLANK_M[1] / metres, 0.0),
             )
             along[count], contrast[count] = x / stretch, top - beside
             count += 1
@@ -97,18 +97,6 @@ def paint_along_borders(
             share = (level[i] / strongest - PAINTED[0]) / (PAINTED[1] - PAINTED[0])
             paint[border, i] = np.uint8(WHOLE * min(max(share, 0.0), 1.0) + 0.5)
     return paint
-
-
-@numba.njit(cache=True)
-def _mean(levels: Float32Array, first: float, last: float) -> float:
-    """Mean brightness between two columns, as far as they lie within the frame; 0 if neither does."""
-    low, high = max(int(first + 0.5), 0), min(int(last + 0.5), len(levels) - 1)
-    if high < low:
-        return 0.0
-    total = 0.0
-    for k in range(low, high + 1):
-        total += levels[k]
-    return total / (high - low + 1)
 
 
 @numba.njit(cache=True)

@@ -27,10 +27,10 @@ def y_on_line(x: float, place: float, arc: FloatArray) -> float:
 
 
 @numba.njit(cache=True)
-def _mean(levels: Float32Array, first: float, last: float) -> float:
-    """Mean brightness between two columns; 0 where they lie mostly outside of the frame."""
+def mean_between(levels: Float32Array, first: float, last: float, least_share: float) -> float:
+    """Mean brightness between two columns; 0 where less than ``least_share`` of the way between them lies within the frame."""
     low, high = max(int(first + 0.5), 0), min(int(last + 0.5), len(levels) - 1)
-    if high - low < 0.5 * (last - first):
+    if high < low or high - low < least_share * (last - first):
         return 0.0
     total = 0.0
     for k in range(low, high + 1):
@@ -77,8 +77,8 @@ def line_traits(
                 traits[k, 3] = min(traits[k, 3], x)
                 traits[k, 4] = max(traits[k, 4], x)
                 traits[k, 2] += min(spacing, LONGEST_ROW_M)
-                left = _mean(grey[row], u - BAND_M[1] / metres, u - BAND_M[0] / metres)
-                right = _mean(grey[row], u + BAND_M[0] / metres, u + BAND_M[1] / metres)
+                left = mean_between(grey[row], u - BAND_M[1] / metres, u - BAND_M[0] / metres, 0.5)
+                right = mean_between(grey[row], u + BAND_M[0] / metres, u + BAND_M[1] / metres, 0.5)
                 if left > 0.0 and right > 0.0:
                     ratio += np.log(left / right)
                     compared += 1

@@ -179,6 +179,26 @@ def test_after_a_signal_an_error_that_a_library_makes_of_it_is_the_signal(number
         raise ValueError
 
 
+def test_a_signal_while_a_module_is_loaded_comes_behind_it(tmp_path, monkeypatch):
+    """Python makes a RuntimeError of what comes up in ``__set_name__``, and who can do without a module catches that."""
+    (tmp_path / "slow_module.py").write_text("""
+import signal
+class Name:
+    def __set_name__(self, owner, name):
+        signal.raise_signal(signal.SIGTERM)
+class Owner:
+    name = Name()
+""")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(Terminated), ending_like_an_interrupt():
+        try:
+            import slow_module
+        except RuntimeError:
+            pytest.fail("the signal came up within the module")
+        assert slow_module.Owner.name is not None
+        time.sleep(5.0)
+
+
 @pytest.mark.parametrize("to_all", [False, True])
 def test_nothing_is_left_of_what_workers_were_at_when_the_command_was_asked_to_end(started, tmp_path, to_all):
     process = started(UNFINISHED, tmp_path / "out")

@@ -12,17 +12,21 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import connection
 from types import FrameType
-from typing import Final, NoReturn
+from typing import Final
 
 PR_SET_PDEATHSIG: Final = 1  # of Linux's <sys/prctl.h>
 # What a shell, a CI system or a batch system ends a command with. SIGINT is Python's own affair.
 ENDING: Final = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 GRACE_S: Final = 3.0  # time that workers have to clear away what they have begun
+
+
+IMPORT_S: Final = 0.05  # after which a signal that came while a module was loaded is looked at again
 
 
 class Terminated(KeyboardInterrupt):
@@ -73,10 +77,17 @@ def ending_like_an_interrupt() -> Iterator[None]:
     SIGINT raises ``KeyboardInterrupt``, as Python has it. Signals that are ignored, as ``nohup`` asks for, stay so. Only
     the main thread can have it otherwise. The exception may come up in the middle of a library that makes another one of it,
     as ctypes does of what comes up while it looks at arguments: after a signal whatever leaves the block is the signal's.
+    While a module is loaded the signal waits: a library that can do without a module takes an exception for a reason to, and
+    the command would go on.
     """
     came, kept = list[KeyboardInterrupt](), {}
 
-    def raise_once(number: int, _frame: FrameType | None) -> NoReturn:
+    def raise_once(number: int, frame: FrameType | None) -> None:
+        if _is_importing(frame):
+            later = threading.Timer(IMPORT_S, os.kill, (os.getpid(), number))
+            later.daemon = True
+            later.start()
+            return
         signal.signal(number, signal.SIG_DFL)
         came.append(KeyboardInterrupt() if number == signal.SIGINT else Terminated(number))
         raise came[0]
@@ -94,6 +105,15 @@ def ending_like_an_interrupt() -> Iterator[None]:
     finally:
         for number, handler in kept.items():
             signal.signal(number, handler)
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    """Whether a module is being loaded where this frame is."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def end_children(grace_s: float = GRACE_S) -> None:
